@@ -1,0 +1,1 @@
+"""Clients: senders, replay and device emulators; they know the wire, not the server."""

@@ -1,0 +1,1 @@
+"""Pure: numpy only; no clock, no socket, no logging."""

@@ -1,0 +1,1 @@
+"""Hexapod geometry: leg lengths from poses and back."""

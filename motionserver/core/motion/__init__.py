@@ -1,0 +1,1 @@
+"""Playing accepted plans; rest-to-rest moves."""

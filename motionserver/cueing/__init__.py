@@ -1,0 +1,1 @@
+"""Cueing algorithms: specific force wanted in, plans out."""

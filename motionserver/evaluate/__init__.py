@@ -1,0 +1,1 @@
+"""Offline evaluation: the live code in lock-step."""

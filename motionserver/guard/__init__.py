@@ -1,0 +1,1 @@
+"""The guard process: sole owner of the platform."""

@@ -1,0 +1,1 @@
+"""Platform packet formats: one file per machine."""

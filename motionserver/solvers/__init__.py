@@ -1,0 +1,1 @@
+"""Quadratic-programme backends behind one interface."""

@@ -1,0 +1,1 @@
+"""Ways motion comes in: one file per simulator format."""

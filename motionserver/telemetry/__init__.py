@@ -1,0 +1,1 @@
+"""Mapped files, requests, measurements."""
