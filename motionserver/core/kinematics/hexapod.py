@@ -1,0 +1,125 @@
+"""Inverse kinematics of the hexapod: leg lengths, speeds, accelerations, Jacobian."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionserver.core.axes import Array
+from motionserver.core.kinematics.rotation import (
+    euler_rate_matrix,
+    euler_rate_matrix_dot,
+    rotation,
+)
+from motionserver.core.limits import Machine
+
+
+def leg_vectors(machine: Machine, poses: Array) -> tuple[Array, Array]:
+    """Vectors from base joint to platform joint, and the arms they act on.
+
+    Args:
+        machine: Geometry.
+        poses: (N, 6) [m, rad].
+
+    Returns:
+        Leg vectors (N, 6, 3) and arms R P_i (N, 6, 3), both in world axes [m].
+    """
+    arms = np.matmul(machine.platform_joints, np.swapaxes(rotation(poses[:, 3:]), -1, -2))
+    offset = poses[:, None, :3] - machine.base_joints
+    offset[..., 2] += machine.neutral_height
+    return arms + offset, arms
+
+
+def leg_lengths(machine: Machine, poses: Array) -> Array:
+    """Pin-to-pin leg lengths for poses (N, 6) or one pose (6,): (N, 6) or (6,) [m]."""
+    batch = np.atleast_2d(poses)
+    legs, _ = leg_vectors(machine, batch)
+    lengths: Array = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
+    return lengths if poses.ndim == 2 else lengths[0]
+
+
+def jacobian(machine: Machine, poses: Array) -> Array:
+    """Derivative of the leg lengths by the pose coordinates (Euler rates included).
+
+    Args:
+        machine: Geometry.
+        poses: (N, 6).
+
+    Returns:
+        J_E with l' = J_E q', (N, 6 legs, 6 axes).
+    """
+    out, _ = _jacobian(machine, poses)
+    out[..., 3:] = np.matmul(out[..., 3:], euler_rate_matrix(poses[:, 3:]))
+    return out
+
+
+def _jacobian(machine: Machine, poses: Array) -> tuple[Array, Array]:
+    """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes; and leg lengths."""
+    legs, arms = leg_vectors(machine, poses)
+    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
+    unit = legs / lengths[..., None]
+    return np.concatenate((unit, np.cross(arms, unit)), axis=-1), lengths
+
+
+def leg_motion(
+    machine: Machine, pose: Array, velocity: Array, acceleration: Array
+) -> tuple[Array, Array, Array]:
+    """Leg lengths, speeds and accelerations of moving poses.
+
+    l'' = n . L'' + (|L'|^2 - l'^2) / l with L'' = p'' + omega' x RP + omega x (omega x RP).
+
+    Args:
+        machine: Geometry.
+        pose: (N, 6).
+        velocity: (N, 6).
+        acceleration: (N, 6).
+
+    Returns:
+        Lengths [m], speeds [m/s], accelerations [m/s2], each (N, 6).
+    """
+    angles, angle_rates = pose[:, 3:], velocity[:, 3:]
+    to_world = euler_rate_matrix(angles)
+    omega = np.einsum("nij,nj->ni", to_world, angle_rates)
+    omega_dot = np.einsum("nij,nj->ni", to_world, acceleration[:, 3:]) + np.einsum(
+        "nij,nj->ni", euler_rate_matrix_dot(angles, angle_rates), angle_rates
+    )
+    legs, arms = leg_vectors(machine, pose)
+    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
+    unit = legs / lengths[..., None]
+    spin = omega[:, None, :]
+    motion = velocity[:, None, :3] + np.cross(spin, arms)
+    second = (
+        acceleration[:, None, :3]
+        + np.cross(omega_dot[:, None, :], arms)
+        + np.cross(spin, np.cross(spin, arms))
+    )
+    speeds = np.einsum("nij,nij->ni", unit, motion)
+    accelerations = (
+        np.einsum("nij,nij->ni", unit, second)
+        + (np.einsum("nij,nij->ni", motion, motion) - speeds**2) / lengths
+    )
+    return lengths, speeds, accelerations
+
+
+def joint_angles(machine: Machine, poses: Array) -> Array:
+    """Swing of each leg's two joints about the neutral leg direction, (N, 2, 6) [rad].
+
+    Index 0 is the base end, 1 the platform end.
+    """
+    neutral, _ = leg_vectors(machine, np.zeros((1, 6)))
+    axis = neutral[0] / np.linalg.norm(neutral[0], axis=-1, keepdims=True)
+    legs, _ = leg_vectors(machine, poses)
+    unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
+    carried = np.matmul(axis, np.swapaxes(rotation(poses[:, 3:]), -1, -2))
+    cosines = np.stack(
+        (np.einsum("nij,ij->ni", unit, axis), np.einsum("nij,nij->ni", unit, carried)), 1
+    )
+    return np.arccos(np.clip(cosines, -1.0, 1.0))
+
+
+def conditioning(machine: Machine, poses: Array) -> Array:
+    """Smallest singular value of the twist Jacobian, angles scaled by the platform radius, (N,)."""
+    radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
+    rows, _ = _jacobian(machine, poses)
+    rows[..., 3:] /= radius
+    smallest: Array = np.linalg.svd(rows, compute_uv=False)[:, -1]
+    return smallest

@@ -1,0 +1,76 @@
+"""Everything that may be tuned while the platform moves, in SI. Hard limits are not here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from math import radians
+
+import numpy as np
+
+from motionserver.core.axes import Array, frozen
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Tunables of all algorithms.
+
+    Attributes:
+        algorithm: "classical" or "thondel2014".
+        scale: Share of the vehicle's specific force and rates that is wanted, 0..1 [-].
+        gain: Gain of the classical washout on top of the scale, 0..1 [-].
+        rotation_gain: Share of the vehicle's own roll and pitch rate that is shown, 0..1 [-].
+        tilt_rate: Perception threshold of tilt coordination [rad/s]; soft in the MPC, in the
+            loop of the classical washout.
+        tilt_acceleration: Threshold of angular acceleration [rad/s2]; soft, see
+            tilt_acceleration_weight.
+        tilt_acceleration_weight: Weight of exceeding it; 0 = row off [-].
+        translation_threshold: Threshold of translational acceleration [m/s2]: dead band of the
+            false-cue figures and bound of washout motion against the cue.
+        box: Position limits per axis, (6,) [m, rad] (Table 2); at most the machine's.
+        horizon: Prediction horizon [s].
+        weight_force: Weight of the specific-force error.
+        weight_input: Weight of the washout's input leaving the reference.
+        weight_change: Weight of changing the input.
+        weight_position: Weight of being away from neutral.
+        filters: Filter set of the washout: "standard" or "fig3".
+        reference: Reference model of surge and sway: "constant", "fade" or "ar".
+        legs: Leg-length rows in the MPC; False is the paper's box-only form.
+        halving: "off", "paper" (equations 7 and 8 as printed) or "sound".
+        backend: QP solver: "daqp", "osqp" or "piqp".
+    """
+
+    algorithm: str = "thondel2014"
+    scale: float = 0.6
+    gain: float = 0.7
+    rotation_gain: float = 1.0
+    tilt_rate: float = radians(3.0)
+    tilt_acceleration: float = radians(0.3)
+    tilt_acceleration_weight: float = 0.0
+    translation_threshold: float = 0.1
+    box: Array = field(
+        default_factory=lambda: frozen([0.198, 0.220, 0.200, *np.radians([17.5, 16.3, 17.5])])
+    )
+    horizon: float = 2.0
+    weight_force: float = 1.0
+    weight_input: float = 0.02
+    weight_change: float = 0.02
+    weight_position: float = 0.5
+    filters: str = "standard"
+    reference: str = "constant"
+    legs: bool = True
+    halving: str = "sound"
+    backend: str = "daqp"
+
+
+def blend(old: Tuning, new: Tuning, share: float) -> Tuning:
+    """Go from one tuning to another: numbers linearly, words and switches at once."""
+    changes: dict[str, object] = {}
+    for item in fields(Tuning):
+        before, after = getattr(old, item.name), getattr(new, item.name)
+        if isinstance(after, float):
+            changes[item.name] = before + share * (after - before)
+        elif isinstance(after, np.ndarray):
+            changes[item.name] = frozen(before + share * (after - before))
+        else:
+            changes[item.name] = after
+    return replace(new, **changes)  # type: ignore[arg-type]
