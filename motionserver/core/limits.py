@@ -25,7 +25,7 @@ class Pace:
     jerk: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Machine:
     """A hexapod and what it may never leave. Lengths are pin to pin.
 

@@ -50,7 +50,8 @@ class Plan:
     @property
     def rest_pose(self) -> Array:
         """Where it ends, (6,)."""
-        return self.pose[-1]
+        last: Array = self.pose[-1]
+        return last
 
     def poses(self, times: Array) -> Array:
         """Poses at ``times`` (N,) >= 0 [s]: (N, 6)."""

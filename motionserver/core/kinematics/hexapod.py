@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from motionserver.core.axes import Array
+from motionserver.core.axes import Array, frozen
 from motionserver.core.kinematics.rotation import (
     euler_rate_matrix,
     euler_rate_matrix_dot,
@@ -105,15 +107,15 @@ def joint_angles(machine: Machine, poses: Array) -> Array:
 
     Index 0 is the base end, 1 the platform end.
     """
-    neutral, _ = leg_vectors(machine, np.zeros((1, 6)))
-    axis = neutral[0] / np.linalg.norm(neutral[0], axis=-1, keepdims=True)
+    axis = _neutral_directions(machine)
     legs, _ = leg_vectors(machine, poses)
-    unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
+    unit = legs / np.sqrt(np.einsum("nij,nij->ni", legs, legs))[..., None]
     carried = np.matmul(axis, np.swapaxes(rotation(poses[:, 3:]), -1, -2))
     cosines = np.stack(
         (np.einsum("nij,ij->ni", unit, axis), np.einsum("nij,nij->ni", unit, carried)), 1
     )
-    return np.arccos(np.clip(cosines, -1.0, 1.0))
+    swing: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
+    return swing
 
 
 def conditioning(machine: Machine, poses: Array) -> Array:
@@ -121,5 +123,17 @@ def conditioning(machine: Machine, poses: Array) -> Array:
     radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
     rows, _ = _jacobian(machine, poses)
     rows[..., 3:] /= radius
-    smallest: Array = np.linalg.svd(rows, compute_uv=False)[:, -1]
-    return smallest
+    smallest = np.linalg.svd(rows, compute_uv=False)[:, -1]
+    return smallest.astype(np.float64, copy=False)
+
+
+@lru_cache(maxsize=16)
+def neutral_conditioning(machine: Machine) -> float:
+    """`conditioning` of the neutral pose, the yardstick of all others."""
+    return float(conditioning(machine, np.zeros((1, 6)))[0])
+
+
+@lru_cache(maxsize=16)
+def _neutral_directions(machine: Machine) -> Array:
+    legs, _ = leg_vectors(machine, np.zeros((1, 6)))
+    return frozen(legs[0] / np.linalg.norm(legs[0], axis=-1, keepdims=True))

@@ -1,0 +1,121 @@
+"""The only makers of accepted plans: proposals, rest poses, rest-to-rest moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionserver.core.axes import Array
+from motionserver.core.limits import Machine
+from motionserver.core.motion.moves import rest_to_rest, straight_way
+from motionserver.core.plan import Plan, rest_at
+from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
+from motionserver.core.safety.verify import (
+    CLOSEST,
+    GUARD_MARGINS,
+    LONGEST_MOVE,
+    Margins,
+    check_legs,
+    check_ways_home,
+    judge,
+    well_formed,
+)
+
+
+def accept_proposal(
+    machine: Machine, plan: Plan, parent: AcceptedPlan, clock: float, homes: Array
+) -> AcceptedPlan | Rejection:
+    """Decide about a planner's proposal.
+
+    Args:
+        machine: Geometry and hard limits.
+        plan: The proposal.
+        parent: The newest accepted plan.
+        clock: The parent's own time now [s]; negative while it still waits for its instant.
+        homes: Poses (H, 6) that must be reachable straight from its rest pose.
+
+    Returns:
+        The accepted plan, or why not.
+    """
+    if plan.parent_id != parent.plan.plan_id or plan.plan_id == plan.parent_id:
+        return Rejection(Reason.WRONG_PARENT)
+    earliest = max(clock, CLOSEST if parent.before is not None else 0.0)
+    if not plan.takeover >= earliest:
+        if not np.isfinite(plan.takeover):
+            return Rejection(Reason.NOT_FINITE)
+        return Rejection(Reason.TOO_LATE, None, None, plan.takeover, earliest)
+    rejection = judge(machine, plan, parent.plan, parent.before, GUARD_MARGINS, homes)
+    if rejection is not None:
+        return rejection
+    return AcceptedPlan(plan, parent.plan, _home_bound(machine, plan.rest_pose, homes))
+
+
+def accept_rest(
+    machine: Machine, pose: Array, plan_id: int, homes: Array, reach: float = 0.0
+) -> AcceptedPlan | Rejection:
+    """Accept standing at ``pose`` (6,), where the platform is known to be.
+
+    Args:
+        machine: Geometry and hard limits.
+        pose: Where it stands.
+        plan_id: Number of the new plan.
+        homes: Poses (H, 6) that must be reachable straight from it.
+        reach: How far a leg may be drawn towards neutral to come inside the margins [m]; a
+            measured pose may lie a hair outside.
+
+    Returns:
+        The accepted plan, or why not.
+    """
+    neutral = np.zeros(6)
+    allowed = straight_way(machine, pose, neutral)
+    rejection: Rejection | None = Rejection(Reason.LEG_LENGTH)
+    for share in (0.0, 0.005, 0.01, 0.02, 0.05):
+        candidate = pose * (1.0 - share)
+        drawn = share * float(np.max(np.abs(allowed.legs[0] - allowed.legs[-1])))
+        if drawn > reach:
+            break
+        plan = rest_at(candidate, plan_id)
+        rejection = (
+            well_formed(plan, LONGEST_MOVE)
+            or check_legs(machine, plan, plan, None, GUARD_MARGINS)
+            or check_ways_home(machine, candidate, homes, GUARD_MARGINS)
+        )
+        if rejection is None:
+            return AcceptedPlan(plan, None, _home_bound(machine, candidate, homes))
+    assert rejection is not None
+    return rejection
+
+
+def accept_move(
+    machine: Machine, parent: AcceptedPlan, takeover: float, goal: Array, plan_id: int, homes: Array
+) -> AcceptedPlan | Rejection:
+    """Accept the straight move from where ``parent`` rests to ``goal`` (6,), stretched to verify.
+
+    Args:
+        machine: Geometry, hard limits, pace.
+        parent: The plan that stands still at ``takeover``.
+        takeover: Instant in the parent's own time, at or after its end [s].
+        goal: Pose to reach.
+        plan_id: Number of the new plan.
+        homes: Poses (H, 6) that must be reachable straight from the goal.
+
+    Returns:
+        The accepted plan, or why not.
+    """
+    start = parent.plan.rest_pose
+    way = straight_way(machine, start, goal)
+    duration = way.duration
+    plan = rest_to_rest(plan_id, parent.plan.plan_id, takeover, start, goal, duration)
+    if takeover < parent.plan.duration:
+        return Rejection(Reason.NOT_AT_REST, None, None, takeover, parent.plan.duration)
+    rejection = (
+        well_formed(plan, LONGEST_MOVE)
+        or check_legs(machine, plan, parent.plan, parent.before, Margins())
+        or check_ways_home(machine, goal, homes, GUARD_MARGINS)
+    )
+    if rejection is not None:
+        return rejection
+    return AcceptedPlan(plan, parent.plan, _home_bound(machine, goal, homes))
+
+
+def _home_bound(machine: Machine, rest: Array, homes: Array) -> float:
+    return max(straight_way(machine, rest, home).duration for home in homes)
