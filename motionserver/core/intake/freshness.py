@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 from typing import Final
 
@@ -38,7 +39,7 @@ class Freshness:
         if len(self._arrivals) < 3:
             return 100 * MS
         times = list(self._arrivals)
-        gaps = sorted(b - a for a, b in zip(times, times[1:], strict=False))
+        gaps = sorted(b - a for a, b in itertools.pairwise(times))
         return min(max(gaps[len(gaps) // 2], 5 * MS), 100 * MS)
 
     def stale_after_ns(self) -> int:
