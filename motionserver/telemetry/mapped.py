@@ -39,7 +39,8 @@ class MappedFile:
             self._map = mmap.mmap(descriptor, size)
         finally:
             os.close(descriptor)
-        magic, self.capacity = _HEAD.unpack_from(self._map)
+        magic, capacity_found = _HEAD.unpack_from(self._map)
+        self.capacity = int(capacity_found)
         expected = _HEAD.size + 2 * (_SLOT.size + self.capacity)
         if magic != _MAGIC or size != expected:
             raise ValueError(
