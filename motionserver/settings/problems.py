@@ -1,0 +1,63 @@
+"""From a validation error to words: file, line, key, what is allowed, what to do."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+
+from pydantic import BaseModel, ValidationError
+
+from motionserver.errors import ConfigError
+
+
+def config_error(
+    error: ValidationError, path: Path | None, text: str, model: type[BaseModel]
+) -> ConfigError:
+    """Word the first problem of a validation error.
+
+    Args:
+        error: What pydantic found.
+        path: The file, if the values came from one.
+        text: Its content, to find the line.
+        model: The model, to suggest a key that exists.
+
+    Returns:
+        The error to raise.
+    """
+    first = error.errors()[0]
+    keys = [str(part) for part in first["loc"]]
+    where = f"{path}{_line(text, keys)}: " if path is not None else ""
+    where += ".".join(keys) or "the whole file"
+    more = len(error.errors()) - 1
+    tail = f" ({more} more after this one)" if more else ""
+    if first["type"] == "extra_forbidden":
+        known = _known(model, keys[:-1])
+        close = difflib.get_close_matches(keys[-1], known, 1)
+        hint = f"Did you mean {close[0]!r}?" if close else f"Allowed: {', '.join(known)}."
+        return ConfigError(where, f"unknown key {keys[-1]!r}", hint + tail)
+    found = first.get("input")
+    shown = "" if isinstance(found, dict | list) else f", found {found!r}"
+    return ConfigError(where, f"{first['msg']}{shown}", f"Correct this value.{tail}")
+
+
+def _line(text: str, keys: list[str]) -> str:
+    for key in reversed(keys):
+        for number, line in enumerate(text.splitlines(), 1):
+            if re.match(rf"\s*(\[+.*\b{re.escape(key)}\b.*\]+|{re.escape(key)}\s*=)", line):
+                return f":{number}"
+    return ""
+
+
+def _known(model: type[BaseModel], keys: list[str]) -> list[str]:
+    current: object = model
+    for key in keys:
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            field = current.model_fields.get(key)
+            current = None if field is None else field.annotation
+            inner = getattr(current, "__args__", None)
+            if inner:
+                current = inner[0]
+    if isinstance(current, type) and issubclass(current, BaseModel):
+        return sorted(current.model_fields)
+    return []
