@@ -23,7 +23,8 @@ from .errors import (
     UnknownValueError,
     VersionError,
 )
-from .framing import MAX_DATAGRAM, VERSION, sequence_delta
+from .framing import MAX_DATAGRAM, VERSION
+from .sequence import sequence_delta
 from .status import PlatformState, Status, decode_status, encode_status
 
 DEFAULT_PORT = 4600

@@ -232,10 +232,13 @@ def _check_length(layout: Layout, offset: int, length: int, expected: int) -> No
 def _check_samples(samples: tuple[Sample, ...]) -> None:
     if isfinite(sum(map(sum, samples))):
         return
-    for index, sample in enumerate(samples):
-        for name, value in zip(_SAMPLE_FIELDS, sample, strict=True):
-            if not isfinite(value):
-                raise not_finite(f"preview[{index}].{name}", value)
+    field, value = next(
+        (f"preview[{index}].{name}", value)
+        for index, sample in enumerate(samples)
+        for name, value in zip(_SAMPLE_FIELDS, sample, strict=True)
+        if not isfinite(value)
+    )
+    raise not_finite(field, value)
 
 
 _REFERENCES: Final = tuple(Reference)

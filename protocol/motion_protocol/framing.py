@@ -217,15 +217,6 @@ def blocks(data: bytes, end: int, known: frozenset[int]) -> Iterator[tuple[int, 
         offset = body + length
 
 
-def sequence_delta(newer: int, older: int) -> int:
-    """How many packets lie from `older` to `newer`, across the wrap at 2^32.
-
-    Returns:
-        A number in [-2^31, 2^31): positive when `newer` was indeed sent later.
-    """
-    return ((newer - older + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-
-
 def _wrong_magic(kind: Kind, magic: bytes) -> MagicError | ByteOrderError:
     if magic == kind.magic[::-1]:
         return ByteOrderError(

@@ -65,24 +65,33 @@ class Layout:
         # A sum is finite exactly when all its terms are: f32 terms cannot overflow a double.
         if isfinite(sum(values[self._floats])):
             return
-        for name, value in zip(
-            self._names[self._floats], values[self._floats], strict=True
-        ):  # pragma: no branch - one of them is not finite
-            if not isfinite(value):
-                raise not_finite(f"{self.name}.{name}", value)
+        name, value = next(
+            (name, value)
+            for name, value in zip(self._names[self._floats], values[self._floats], strict=True)
+            if not isfinite(value)
+        )
+        raise not_finite(f"{self.name}.{name}", value)
 
-    def _misfit(self, values: tuple[Any, ...]) -> FieldError | NotFiniteError:
-        for name, code, value in zip(self._names, self._codes, values, strict=True):
-            try:
-                struct.pack("<" + code, value)
-            except (struct.error, OverflowError) as error:
-                field = f"{self.name}.{name}"
-                return FieldError(
-                    f"{field} = {value!r} does not fit its field on the wire ({error}); "
-                    f"send a value of the type and width given in the byte tables",
-                    field=field,
-                )
-        raise AssertionError(f"{self.name}: every field fits alone, yet not together")
+    def _misfit(self, values: tuple[Any, ...]) -> FieldError:
+        name, code, value = next(
+            (name, code, value)
+            for name, code, value in zip(self._names, self._codes, values, strict=True)
+            if not _fits(code, value)
+        )
+        field = f"{self.name}.{name}"
+        return FieldError(
+            f"{field} = {value!r} does not fit its field of type {code!r} on the wire; "
+            f"send a value of the type and width given in the byte tables",
+            field=field,
+        )
+
+
+def _fits(code: str, value: bytes | float) -> bool:
+    try:
+        struct.pack("<" + code, value)
+    except (struct.error, OverflowError):
+        return False
+    return True
 
 
 def not_finite(field: str, value: float) -> NotFiniteError:
