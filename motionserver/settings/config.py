@@ -1,4 +1,4 @@
-"""The configuration of `motionserver run`: TOML, overridden by the environment, in SI for inside."""
+"""The configuration of `motionserver run`: TOML, overridden by the environment."""
 
 from __future__ import annotations
 
