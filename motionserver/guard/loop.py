@@ -14,7 +14,7 @@ from collections import deque
 from pathlib import Path
 from typing import Final
 
-from motionserver.core.device import Feedback, Order
+from motionserver.core.device import Feedback
 from motionserver.core.plan import Plan, pack, unpack
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
@@ -223,8 +223,6 @@ class GuardLoop:
         )
 
     def _send(self, setpoint: Setpoint) -> None:
-        if self.options.dry_run and setpoint.order is not Order.WAIT:
-            setpoint = Setpoint(Order.WAIT, setpoint.state, setpoint.legs)
         try:
             self._link.sendto(self._format.encode(setpoint), self.options.peer)
             self.guard.record.counters["packets_sent"] += 1

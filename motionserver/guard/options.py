@@ -22,7 +22,6 @@ class GuardOptions:
         options: How this machine differs.
         peer: Address of the platform.
         rate_hz: Packets per second [Hz].
-        dry_run: True: compute and show everything, send only the mode word.
         unchecked: Names of limits that the machine's file does not state.
     """
 
@@ -31,7 +30,6 @@ class GuardOptions:
     options: PlatformOptions
     peer: tuple[str, int]
     rate_hz: float
-    dry_run: bool
     unchecked: tuple[str, ...]
 
 
@@ -47,11 +45,11 @@ def read_options(run_dir: Path) -> GuardOptions:
             send_period=1.0 / platform["rate_hz"],
             plan_period=data["planner"]["period"],
             engage=data["engage"],
+            dry_run=data["dry_run"],
         ),
         format=platform["format"],
         options=PlatformOptions(**options),
         peer=(platform["host"], platform["port"]),
         rate_hz=platform["rate_hz"],
-        dry_run=data["dry_run"],
         unchecked=tuple(data["unchecked"]),
     )

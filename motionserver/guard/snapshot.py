@@ -53,7 +53,7 @@ def snapshot(
             "state": record.state,
             "reason": record.reason,
             "since_ns": record.since_ns,
-            "dry_run": options.dry_run,
+            "dry_run": options.guard.dry_run,
             "order": setpoint.order,
             "plan": None
             if playback is None
