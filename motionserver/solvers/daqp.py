@@ -43,13 +43,14 @@ class Daqp:
         if not finite(vectors, matrices):
             return no_solution(len(vectors.q))
         if matrices is not None:
+            # it takes no read-only arrays
             self._matrices = QpMatrices(
-                np.ascontiguousarray(matrices.H), np.ascontiguousarray(matrices.A)
+                np.require(matrices.H, np.float64, "CW"), np.require(matrices.A, np.float64, "CW")
             )
         assert self._matrices is not None
         upper = _bounded(np.concatenate((vectors.box_upper, vectors.upper)))
         lower = _bounded(np.concatenate((vectors.box_lower, vectors.lower)))
-        q = np.ascontiguousarray(vectors.q, dtype=np.float64)
+        q = np.require(vectors.q, np.float64, "CW")
         if self._model is None:
             flag = self._set_up(q, upper, lower)
         elif matrices is None:
