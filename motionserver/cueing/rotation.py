@@ -1,4 +1,4 @@
-"""The vehicle's own roll and pitch on the platform, kept apart from tilt coordination.
+"""The vehicle's own rotation on the platform, kept apart from tilt coordination.
 
 The platform's angle is tilt plus this part. Only the tilt is bound by the perception threshold, so
 the split must survive the governor's blending: the part is remembered for every proposed plan.
@@ -20,11 +20,11 @@ from motionserver.cueing.stopping import with_stop
 
 REMEMBERED: Final = 16
 """Plans whose rotation part is kept; the accepted one is at most a few proposals old."""
-_ROLL_PITCH: Final = slice(3, 5)
+_ANGLES: Final = slice(3, 6)
 
 
 class RotationPart:
-    """Third-order high-pass of the body rates, one for roll and one for pitch.
+    """Third-order high-pass of the body rates: roll, pitch, yaw.
 
     Args:
         filters: Its corner and lags.
@@ -39,7 +39,11 @@ class RotationPart:
     def rebuild(self, filters: FilterSet, grid: Grid) -> None:
         """Take other corners or another grid; what is remembered stays valid."""
         self._grid = grid
-        self._map: Condensed = condense(rate_high_pass(filters.rotation, filters.rotation_tau), grid)
+        maps: list[Condensed] = []
+        for corner in (filters.rotation, filters.rotation, filters.yaw.omega):
+            maps.append(condense(rate_high_pass(corner, filters.rotation_tau), grid))
+        self._phi: Array = np.stack([each.phi for each in maps])
+        self._gamma: Array = np.stack([each.gamma for each in maps])
 
     def at(self, parent: Plan, takeover: float) -> PlatformState:
         """The part within a plan at an instant of its time; zero for a plan not from here."""
@@ -56,18 +60,18 @@ class RotationPart:
         Args:
             parent: The accepted plan.
             takeover: Hand-over in its time [s].
-            rates: Wanted roll and pitch rate on each piece, (M, 2) [rad/s].
+            rates: Wanted roll, pitch, yaw rate on each piece, (M, 3) [rad/s].
             stop: Duration of the stop [s].
 
         Returns:
             Times (K + 2,) from 0, and pose, velocity, acceleration, each (K + 2, 6).
         """
         begin = self.at(parent, takeover)
-        start = np.stack((begin.pose, begin.velocity, begin.acceleration))[:, _ROLL_PITCH]
-        states = self._map.phi @ start + self._map.gamma @ rates
-        tables = np.zeros((3, len(states) + 1, 6))
-        tables[:, 0, _ROLL_PITCH] = start
-        tables[:, 1:, _ROLL_PITCH] = np.swapaxes(states, 0, 1)
+        start = np.stack((begin.pose, begin.velocity, begin.acceleration))[:, _ANGLES]
+        states = self._phi @ start.T[:, None, :, None] + self._gamma @ rates.T[:, None, :, None]
+        tables = np.zeros((3, states.shape[1] + 1, 6))
+        tables[:, 0, _ANGLES] = start
+        tables[:, 1:, _ANGLES] = states[..., 0].T
         times = np.concatenate(([0.0], self._grid.knots))
         out = with_stop(times, tables[0], tables[1], tables[2], stop)
         self._candidate = Plan(0, parent.plan_id, takeover, *(frozen(table) for table in out))

@@ -8,7 +8,7 @@ import numpy as np
 
 from motionserver.core.axes import Array
 
-STOP_TIME: Final = 0.6
+STOP_TIME: Final = 0.4
 """How long the stop at the end of a plan takes [s]."""
 
 

@@ -130,7 +130,9 @@ class Thondel:
             self._report = replace(self._report, solver_status="not finite", iterations=0)
             return None
         wanted[:, 5] = self._onset_of_yaw(wanted[:, 5], float(stimulus.rates[2]))
-        rates = self._to_pieces @ wanted[:, 3:5] * self._tuning.rotation_gain
+        rates = self._to_pieces @ wanted[:, 3:] * self._tuning.rotation_gain
+        # yaw is a channel of its own here
+        rates[:, 2] = 0.0
         rotation = self._rotation.ahead(parent, takeover, rates, STOP_TIME)
         state = stacked_state(minus(start, self._rotation.at(parent, takeover)))
         nodes = self._grid.nodes
