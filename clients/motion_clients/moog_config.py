@@ -105,6 +105,8 @@ class MoogConfig:
 
     def is_within_stroke(self, extensions: Six) -> bool:
         """Whether six leg extensions [m] are mechanically possible."""
-        return all(
-            -LENGTH_TOLERANCE <= x <= self.geometry.stroke + LENGTH_TOLERANCE for x in extensions
-        )
+        return all(map(self.is_leg_within_stroke, extensions))
+
+    def is_leg_within_stroke(self, extension: float) -> bool:
+        """Whether one leg extension [m] is mechanically possible."""
+        return -LENGTH_TOLERANCE <= extension <= self.geometry.stroke + LENGTH_TOLERANCE
