@@ -8,8 +8,8 @@ from math import copysign, sqrt
 
 from motion_clients.hexapod_legs import Six
 
-_POSITION_GAIN = 30.0  # [1/s]; with the next, a critically damped drive of 60 rad/s
-_SPEED_GAIN = 120.0  # [1/s]
+_POSITION_GAIN = 20.0  # [1/s]; with the next, a critically damped drive of 40 rad/s
+_SPEED_GAIN = 80.0  # [1/s]
 _REST_SPEED = 1e-4  # [m/s]
 _ARRIVED = 1e-5  # [m]
 

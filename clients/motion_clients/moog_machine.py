@@ -177,7 +177,8 @@ class MoogMachine:
         elif max(abs(b - a) for a, b in zip(self.target, legs, strict=True)) > config.jump_max:
             self.latch_fault(Fault.ENVELOPE)
         else:
-            self.legs.follow(legs, config.frame_period)
+            # Over two frames: ending with the frame, the legs would stop for every late command.
+            self.legs.follow(legs, 2.0 * config.frame_period)
 
     def select(self, mode: CommandMode) -> None:
         """DOF_MODE, LENGTH_MODE: only in IDLE."""
