@@ -1,10 +1,13 @@
-"""Sends what a sensor on the platform reads to the server, as native cues flagged so."""
+"""Sends what a sensor on the platform reads to the server, as cues flagged so.
+
+Not a :class:`~motion_clients.CueSender`: a sensor is no simulator, and must never say bye.
+"""
 
 from __future__ import annotations
 
+import secrets
 import socket
 import time
-from random import Random
 
 from motion_protocol import Cue, Flags, Motion, Reference, Vector3, encode_cue
 
@@ -18,19 +21,19 @@ class ForceSender:
     """
 
     def __init__(
-        self, address: tuple[str, int], *, key: bytes | None = None, seed: int = 0
+        self, address: tuple[str, int], *, key: bytes | None = None, session: int | None = None
     ) -> None:
         """A sender with a session of its own.
 
         Args:
             address: Where to send, host and port.
             key: Shared secret; with it packets are signed.
-            seed: Of the session number.
+            session: Session number; random unless given.
         """
         self.sent = 0
         self.refused = 0
         self._key = key
-        self._session = Random(seed).getrandbits(32)
+        self._session = secrets.randbits(32) if session is None else session
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._socket.connect(address)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import copysign, sqrt
 
-from motion_clients.hexapod_legs import Six
+from .hexapod_legs import Six
 
 _POSITION_GAIN = 20.0  # [1/s]; with the next, a critically damped drive of 40 rad/s
 _SPEED_GAIN = 80.0  # [1/s]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from motion_clients.hexapod_legs import T2_COMPACT, HexapodGeometry, Six
-from motion_clients.moog_wire import CommandMode, DofAxes, Mcw
+from .hexapod_legs import T2_COMPACT, HexapodGeometry, Six
+from .moog_wire import CommandMode, DofAxes, Mcw
 
 LENGTH_TOLERANCE = 1e-6
 """Slack of every range test [m, rad].

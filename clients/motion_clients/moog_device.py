@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import isfinite
 
-from motion_clients.hexapod_legs import Six
-from motion_clients.moog_machine import MoogMachine
-from motion_clients.moog_wire import (
+from .hexapod_legs import Six
+from .moog_machine import MoogMachine
+from .moog_wire import (
     COMMAND_SIZE,
     CommandMode,
     DiscreteIo,

@@ -12,12 +12,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from motion_clients.flawed_link import FlawedLink, LinkFlaws
-from motion_clients.moog_config import MoogConfig
-from motion_clients.moog_device import MoogDevice
-from motion_clients.moog_judge import JudgedLimits, MoogJudge
-from motion_clients.motion_log import MotionLog
-from motion_clients.platform_accelerometer import PlatformAccelerometer, SendForce
+from .flawed_link import FlawedLink, LinkFlaws
+from .force_sender import ForceSender
+from .moog_config import MoogConfig
+from .moog_device import MoogDevice
+from .moog_judge import JudgedLimits, MoogJudge
+from .motion_log import MotionLog
+from .platform_accelerometer import PlatformAccelerometer, SendForce
 
 Address = tuple[str, int]
 Mishap = tuple[float, Callable[[MoogDevice], None]]
@@ -205,7 +206,8 @@ def run_emulator(
     mishaps: Sequence[Mishap] = (),
     log_path: Path | None = None,
     summary_path: Path | None = None,
-    send_force: SendForce | None = None,
+    force_to: Address | None = None,
+    key: bytes | None = None,
     seed: int = 0,
     on_ready: Callable[[Address], None] | None = None,
 ) -> dict[str, object]:
@@ -222,7 +224,9 @@ def run_emulator(
         mishaps: What happens to the base, and when after the start [s].
         log_path: File for every datagram received.
         summary_path: File for the verdict, JSON.
-        send_force: Gets what an accelerometer on the platform reads, 100 times a second.
+        force_to: Where to send, as cues 100 times a second, what an accelerometer on the platform
+            reads.
+        key: Shared secret those cues are signed with.
         seed: Of everything random.
         on_ready: Called with the address once the base listens.
 
@@ -233,7 +237,7 @@ def run_emulator(
         OSError: The address cannot be bound or a file not be written.
     """
 
-    async def run(log: MotionLog) -> dict[str, object]:
+    async def run(log: MotionLog, send_force: SendForce | None) -> dict[str, object]:
         done = asyncio.Event()
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -256,8 +260,12 @@ def run_emulator(
                 await asyncio.wait_for(done.wait(), duration)
         return emulator.summary()
 
-    with MotionLog(log_path) as log:
-        verdict = asyncio.run(run(log))
+    with contextlib.ExitStack() as stack:
+        log = stack.enter_context(MotionLog(log_path))
+        sender = None
+        if force_to is not None:
+            sender = stack.enter_context(contextlib.closing(ForceSender(force_to, key=key)))
+        verdict = asyncio.run(run(log, sender))
     if summary_path is not None:
         summary_path.write_text(json.dumps(verdict, indent=2) + "\n", encoding="utf-8")
     return verdict

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Protocol
 
-from motion_clients.hexapod_legs import Six
-from motion_clients.moog_config import MoogConfig
-from motion_clients.moog_wire import (
+from .hexapod_legs import Six
+from .moog_config import MoogConfig
+from .moog_wire import (
     COMMAND_SIZE,
     CommandMode,
     MachineState,

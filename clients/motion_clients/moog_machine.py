@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from motion_clients.hexapod_legs import Six
-from motion_clients.leg_servos import LegServos
-from motion_clients.moog_config import MoogConfig
-from motion_clients.moog_wire import CommandMode, Fault, MachineState, Mcw
-from motion_clients.position_feedback import PositionFeedback
+from .hexapod_legs import Six
+from .leg_servos import LegServos
+from .moog_config import MoogConfig
+from .moog_wire import CommandMode, Fault, MachineState, Mcw
+from .position_feedback import PositionFeedback
 
 STEP = 0.002
 """Integration step of the model [s]."""

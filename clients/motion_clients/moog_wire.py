@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
-from motion_clients.hexapod_legs import Six
+from .hexapod_legs import Six
 
 COMMAND_SIZE = 32
 STATUS_SIZE = 40

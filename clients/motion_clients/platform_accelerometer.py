@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 
-from motion_clients.hexapod_legs import (
+from .hexapod_legs import (
     HexapodGeometry,
     PoseNotFoundError,
     Six,

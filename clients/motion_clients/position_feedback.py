@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from motion_clients.hexapod_legs import HexapodGeometry, PoseNotFoundError, Six
+from .hexapod_legs import HexapodGeometry, PoseNotFoundError, Six
 
 
 class PositionFeedback:

@@ -1,14 +1,15 @@
 import struct
+from itertools import pairwise
 from math import nan, pi, sin
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moog_host import NEUTRAL, VirtualHost, frame, parse
 from motion_clients.moog_config import MoogConfig
 from motion_clients.moog_device import MoogDevice
 from motion_clients.moog_machine import STEP
 from motion_clients.moog_wire import CommandMode, DiscreteIo, Fault, MachineState
-from moog_host import NEUTRAL, VirtualHost, frame, parse
 
 ENGAGE, START, NEW_POSITION, PARK, RESET = 180, 175, 130, 210, 160
 S = MachineState
@@ -60,9 +61,7 @@ def test_legs_are_bounded_in_lift_and_park():
     assert max(abs(v) for rates in speeds for v in rates) < 0.102
     # Per step of the model, so with the servo's own ripple on top of the bound.
     changes = [
-        abs(b - a) / STEP
-        for one, two in zip(speeds, speeds[1:], strict=False)
-        for a, b in zip(one, two, strict=True)
+        abs(b - a) / STEP for one, two in pairwise(speeds) for a, b in zip(one, two, strict=True)
     ]
     assert max(changes) < 1.0
 
@@ -314,6 +313,25 @@ def test_graver_fault_overrules_a_lesser_one_and_not_the_reverse():
     assert moog.device.faults == Fault.MOTOR_THERMAL | Fault.AMPLIFIER | Fault.COMM
 
 
+def test_option_the_base_lacks_and_inhibit_after_disable_are_refused():
+    moog = engaged()
+    moog.send(frame(140))
+    moog.send(frame(220))
+    moog.send(frame(150))
+    assert moog.device.state is S.DISABLED
+    assert moog.device.counters["refused"] == 2
+
+
+def test_legs_that_contradict_each_other_repeat_the_last_pose():
+    moog = engaged()
+    moog.device.stick_leg(0)
+    moog.device.stick_leg(3)
+    moog.device.legs.extensions[0] = 0.2789
+    moog.device.legs.extensions[1] = 0.0
+    moog.repeat(4.0, PARK)
+    assert len(moog.replies[-1]) == 40
+
+
 def test_disable_comes_down_and_inhibit_stands():
     moog = engaged()
     moog.repeat(0.5, 150)
@@ -365,11 +383,7 @@ def test_fault_at_full_speed_brakes_within_the_drives_limits():
     moog.repeat(5.0, NEW_POSITION)
     assert moog.device.is_parked
     assert max(abs(v) for speeds in rates for v in speeds) <= 0.78
-    changes = [
-        abs(b - a)
-        for x, y in zip(rates, rates[1:], strict=False)
-        for a, b in zip(x, y, strict=True)
-    ]
+    changes = [abs(b - a) for x, y in pairwise(rates) for a, b in zip(x, y, strict=True)]
     assert max(changes) <= 10.4 * STEP + 1e-9
 
 

@@ -1,18 +1,21 @@
 import asyncio
 import json
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
 
 import motion_clients
+import motion_protocol
 import pytest
+from moog_host import frame, parse
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_device import MoogDevice
 from motion_clients.moog_emulator import Emulator, run_emulator
 from motion_clients.moog_wire import MachineState
 from motion_clients.motion_log import MotionLog, read_motion_log
-from moog_host import frame, parse
+from motion_protocol import Flags, decode_cue
 
 
 class LiveHost(asyncio.DatagramProtocol):
@@ -31,8 +34,19 @@ class LiveHost(asyncio.DatagramProtocol):
 
     async def ask_until(self, datagram, state):
         """Ask at the pace of the replies until the base is in a state."""
-        while parse(await self.ask(datagram))[2] & 15 != state:
+        for _ in range(3000):
+            if parse(await self.ask(datagram))[2] & 15 == state:
+                return
             await asyncio.sleep(1 / 60)
+        pytest.fail(f"the base never came to {state.name}")
+
+
+async def until(is_true):
+    for _ in range(5000):
+        if is_true():
+            return
+        await asyncio.sleep(0.001)
+    pytest.fail("what was waited for never came")
 
 
 async def connect(emulator):
@@ -75,12 +89,13 @@ async def test_live_base_answers_every_host_and_counts_losses():
         for _ in range(50):
             one.transport.sendto(frame(170))
             two.transport.sendto(frame(170))
-        await asyncio.sleep(0.1)
+        await until(lambda: emulator.summary()["packets"] == 100)
         summary = emulator.summary()
         assert len(summary["hosts"]) == 2
         assert 20 < summary["lost_to_base"] < 80
-        assert summary["replies"] == 2 * (100 - summary["lost_to_base"])
-        assert one.replies.qsize() + two.replies.qsize() == summary["replies"]
+        answers = 2 * (100 - summary["lost_to_base"])
+        await until(lambda: one.replies.qsize() + two.replies.qsize() == answers)
+        assert emulator.summary()["replies"] == answers
         one.transport.close()
         two.transport.close()
 
@@ -126,18 +141,28 @@ def test_run_for_a_while_writes_its_verdict(tmp_path):
     assert verdict["ended_safe"]
 
 
+def test_run_sends_what_its_platform_feels():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(5.0)
+        run_emulator("127.0.0.1", 0, duration=0.2, force_to=receiver.getsockname())
+        cue = decode_cue(receiver.recv(2048))
+    assert cue.flags & Flags.MEASURED_AT_PLATFORM
+    assert cue.motion.acceleration == pytest.approx((0, 0, 9.80665), abs=0.5)
+
+
 def test_run_ends_with_a_signal():
     script = (
         "from motion_clients.moog_emulator import run_emulator\n"
         "v = run_emulator('127.0.0.1', 0, on_ready=lambda a: print('ready', flush=True))\n"
         "print(v['state'])\n"
     )
-    folder = str(Path(motion_clients.__file__).parents[1])
+    folders = [str(Path(p.__file__).parents[1]) for p in (motion_clients, motion_protocol)]
     with subprocess.Popen(
         [sys.executable, "-c", script],
         stdout=subprocess.PIPE,
         text=True,
-        env={"PYTHONPATH": folder},
+        env={"PYTHONPATH": ":".join(folders)},
     ) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGTERM)

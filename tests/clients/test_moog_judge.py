@@ -4,10 +4,10 @@ from math import nan, pi, sin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moog_host import VirtualHost, frame
 from motion_clients.moog_config import MoogConfig
 from motion_clients.moog_device import MoogDevice
 from motion_clients.moog_judge import JudgedLimits, MoogJudge
-from moog_host import PERIOD, VirtualHost, frame
 
 NEW_POSITION, PARK = 130, 210
 

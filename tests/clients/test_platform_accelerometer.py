@@ -1,10 +1,10 @@
 from math import cos, hypot, pi, sin
 
 import pytest
+from moog_host import VirtualHost
 from motion_clients.moog_config import MoogConfig
 from motion_clients.moog_device import MoogDevice
 from motion_clients.platform_accelerometer import GRAVITY, PlatformAccelerometer
-from moog_host import VirtualHost
 
 HOME = (0.0, 0.0, -0.17, 0.0, 0.0, 0.0)
 
