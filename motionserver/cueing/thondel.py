@@ -182,9 +182,9 @@ class Thondel:
             bounds = np.tile(share, len(free)) - side * box_free
             legs = leg_rows(self._machine, nominal, self._margins)
             leg = np.zeros((len(free) * 6, layout.size))
-            leg[:, : layout.inputs] = np.matmul(legs.gradient, plant.node_gamma).reshape(
-                -1, layout.inputs
-            ) / LEG_UNIT
+            leg[:, : layout.inputs] = (
+                np.matmul(legs.gradient, plant.node_gamma).reshape(-1, layout.inputs) / LEG_UNIT
+            )
             leg[:, layout.leg] = -1.0
             room = legs.room - np.einsum("nla,na->nl", legs.gradient, free)
             upper = np.concatenate(

@@ -10,10 +10,12 @@ from pathlib import Path
 
 from motionserver.guard.loop import GuardLoop, open_link
 from motionserver.guard.options import read_options
+from motionserver.telemetry.parent import follow_parent
 
 
 def main() -> int:
     """Wait for the guard's lock, then run: the second process started is a warm spare."""
+    follow_parent()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
     options = read_options(run_dir)

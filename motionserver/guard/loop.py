@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import gc
 import logging
-import os
 import signal
 import socket
 import struct
@@ -54,7 +53,6 @@ class GuardLoop:
         self._ticks_per_send = ticks
         self._tick_ns = SECOND / (ticks * options.rate_hz)
         self._lateness = Lateness(int(self._tick_ns))
-        self._parent = os.getppid()
         self._leave = False
         self._seen_proposal = self._maps.proposal.newest_sequence()
         self._seen_cue = 0
@@ -114,8 +112,6 @@ class GuardLoop:
     def _step(self, now: int, slot: int) -> None:
         send_slot = slot // self._ticks_per_send
         is_due = send_slot != self._sent_slot
-        if os.getppid() != self._parent:
-            self._ask_to_leave("the supervisor is gone")
         requests = self._requests.poll()
         counters = self.guard.record.counters
         counters["request_malformed"] = self._requests.malformed

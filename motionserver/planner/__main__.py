@@ -10,10 +10,12 @@ from pathlib import Path
 from motionserver.errors import MotionServerError
 from motionserver.planner.loop import PlannerLoop
 from motionserver.planner.options import read_options
+from motionserver.telemetry.parent import follow_parent
 
 
 def main() -> int:
     """Run one planner."""
+    follow_parent()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir = Path(sys.argv[1])
     try:

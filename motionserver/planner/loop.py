@@ -5,15 +5,14 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-import os
 import signal
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-
 from motion_protocol import PlatformState as WireState
 from motion_protocol import Status, encode_status
+
 from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.intake.intake import Head, Intake
 from motionserver.core.kinematics.rotation import felt
@@ -60,7 +59,6 @@ class PlannerLoop:
         self._measured_ns = 0
         self._timing = Timing(int(options.period * SECOND))
         self._view = PlannerView()
-        self._parent_pid = os.getppid()
         self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None
@@ -97,8 +95,6 @@ class PlannerLoop:
         except Exception:
             self._inputs.counters["tick_errors"] += 1
             log.exception("period failed; the accepted plan plays on")
-        if os.getppid() != self._parent_pid:
-            self._finish()
         self._arm(now_ns())
 
     def _arm(self, now: int) -> None:
@@ -134,7 +130,7 @@ class PlannerLoop:
         handover = self._clock.handover(now, self._timing.expected_ns)
         if handover is not None:
             self._think(now, handover, stimulus, sensor)
-        self._serve(now)
+        self._serve()
         self._status(now)
         if now - self._snapshot_ns > SNAPSHOT_NS:
             self._snapshot_ns = now
@@ -163,9 +159,7 @@ class PlannerLoop:
     def _felt(self, handover: Handover) -> Array:
         """What the person feels about now, gravity included, (3,) [m/s2]."""
         state = handover.parent.state(handover.takeover)
-        force, _ = felt(
-            state.pose, state.velocity, state.acceleration, self.options.machine.head
-        )
+        force, _ = felt(state.pose, state.velocity, state.acceleration, self.options.machine.head)
         return force
 
     def _compare(self, now: int, sensor: list[VehicleMotion], model: Array) -> None:
@@ -177,9 +171,9 @@ class PlannerLoop:
         elif now - self._measured_ns > SECOND // 5:
             self._measured.lost()
 
-    def _serve(self, now: int) -> None:
+    def _serve(self) -> None:
         for message, address in self._requests.poll():
-            answer, tuning = self._tuner.serve(message, now)
+            answer, tuning = self._tuner.serve(message)
             if tuning is not None:
                 self._thinker.retune(tuning)
             self._requests.answer(address, answer)

@@ -70,6 +70,7 @@ class SourceSection(Strict):
     key_file: str = ""
     topic: str = "motion/0/in/cue"
     connect: list[str] = Field(default_factory=list)
+    allow_unsigned: bool = False
 
     @field_validator("listen")
     @classmethod

@@ -9,6 +9,7 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI
 
+from motionserver.telemetry.parent import follow_parent
 from motionserver.web.config import WebConfig, WebConfigError, read_config
 from motionserver.web.wiring import wired_app
 
@@ -58,6 +59,7 @@ def main(arguments: list[str]) -> int:
     except WebConfigError as error:
         sys.stderr.write(f"page not started: {error}\n")
         return 2
+    follow_parent()
     os.nice(_NICENESS)
     server(app, config).run()
     return 0

@@ -14,8 +14,8 @@ from motionserver.telemetry.requests import ask
 from motionserver.web.app import build_app
 from motionserver.web.config import WebConfig
 
-GUARD_SNAPSHOT: Final = "guard.snapshot"
-PLANNER_SNAPSHOT: Final = "planner.snapshot"
+GUARD_SNAPSHOT: Final = "guard.map"
+PLANNER_SNAPSHOT: Final = "planner.map"
 GUARD_REQUESTS: Final = "guard.sock"
 PLANNER_REQUESTS: Final = "planner.sock"
 _PATIENCE: Final = 1.0
