@@ -11,7 +11,7 @@ LENGTH_TOLERANCE = 1e-6
 """Slack of every range test [m, rad].
 
 A word of 0.2789 m is off by up to 1.5e-8 m as float32; a leg length made of six such DOF words,
-by less than 2e-7 m. So a micrometre is never a rounding error, and never matters to a machine.
+by up to 3e-8 m. So a micrometre is never a rounding error, and never matters to a machine.
 """
 
 

@@ -24,11 +24,11 @@ from .moog_wire import (
     decode_command,
 )
 
-SPEED_TOLERANCE = 5e-5
-"""Slack of the speed test [m/s]: float32 words differenced at 60 Hz err by up to 2e-5."""
+SPEED_TOLERANCE = 2e-5
+"""Slack of the speed test [m/s]: float32 words differenced at 60 Hz err by up to 4e-6."""
 
-ACCELERATION_TOLERANCE = 5e-3
-"""Slack of the acceleration test [m/s²]: two such differences err by up to 3e-3."""
+ACCELERATION_TOLERANCE = 2e-3
+"""Slack of the acceleration test [m/s²]: differenced twice they err by up to 4e-4."""
 
 _DETAILS_KEPT = 20
 _KNOWN = frozenset(int(mcw) for mcw in Mcw)

@@ -141,11 +141,14 @@ def emulate(
         float | None, typer.Option("--seconds", help="end by itself", metavar="S")
     ] = None,
     seed: Annotated[int, typer.Option("--seed", help="of everything random")] = 0,
+    cut_after: Annotated[
+        float | None, typer.Option("--cut-after", help="pull the cable then", metavar="S")
+    ] = None,
 ) -> None:
     """Be a platform: state machine, rate-limited legs, latched faults, and a judge."""
     from motionserver.cli.devices import emulate as emulate_device
 
-    verdict = emulate_device(form, listen, force_to, summary, log, seconds, seed)
+    verdict = emulate_device(form, listen, force_to, summary, log, seconds, seed, cut_after)
     typer.echo(json.dumps(verdict, indent=2))
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from pathlib import Path
 
+from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_emulator import run_emulator
 from motion_clients.recording import RecordingError, recording_names, recording_path
 from motion_clients.replay import FORMATS
@@ -32,11 +34,16 @@ def emulate(
     log: Path | None,
     seconds: float | None,
     seed: int,
+    cut_after: float | None,
 ) -> dict[str, object]:
     """Be a device until a signal; returns the judge's verdict."""
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)
+    cut = LinkFlaws()
+    if cut_after is not None:
+        begin = time.monotonic() + cut_after
+        cut = LinkFlaws(silent_from=begin, silent_until=float("inf"))
     try:
         return run_emulator(
             host,
@@ -46,6 +53,8 @@ def emulate(
             summary_path=summary,
             force_to=_address("--force-to", force_to) if force_to else None,
             seed=seed,
+            to_base=cut,
+            to_host=cut,
         )
     except OSError as error:
         raise ConfigError("--listen", f"{listen}: {error.strerror}", "Choose another.") from error

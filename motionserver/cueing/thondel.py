@@ -25,7 +25,7 @@ from motionserver.cueing.reference import Reference
 from motionserver.cueing.rotation import RotationPart
 from motionserver.cueing.stopping import STOP_TIME, with_stop
 from motionserver.cueing.thondel_cost import make_cost
-from motionserver.cueing.thondel_legs import leg_rows, margins_over
+from motionserver.cueing.thondel_legs import leg_rows, margins_over, way_home_gains, with_way_home
 from motionserver.cueing.thondel_plant import make_plant, stacked_state
 from motionserver.cueing.thondel_rows import LARGEST_INPUT, LEG_UNIT, make_rows
 from motionserver.cueing.tuning import Tuning
@@ -90,6 +90,7 @@ class Thondel:
         instants = grid.knots[grid.nodes]
         self._looks = np.append(instants, instants[-1] + STOP_TIME)
         self._margins = margins_over(self._looks)
+        self._leg_gamma = frozen(way_home_gains(self._plant.node_gamma) / LEG_UNIT)
         self._weigh(tuning)
 
     def _make_reference(self, tuning: Tuning) -> Reference:
@@ -180,13 +181,15 @@ class Thondel:
             box = self._box_table * side[:, None]
             box[np.arange(len(side)), self._box_slack] = -1.0
             bounds = np.tile(share, len(free)) - side * box_free
-            legs = leg_rows(self._machine, nominal, self._margins)
-            leg = np.zeros((len(free) * 6, layout.size))
-            leg[:, : layout.inputs] = (
-                np.matmul(legs.gradient, plant.node_gamma).reshape(-1, layout.inputs) / LEG_UNIT
+            home = self._machine.parked_pose
+            along = with_way_home(nominal, home)
+            legs = leg_rows(self._machine, along, self._margins)
+            leg = np.zeros((len(along) * 6, layout.size))
+            leg[:, : layout.inputs] = np.matmul(legs.gradient, self._leg_gamma).reshape(
+                -1, layout.inputs
             )
             leg[:, layout.leg] = -1.0
-            room = legs.room - np.einsum("nla,na->nl", legs.gradient, free)
+            room = legs.room - np.einsum("nla,na->nl", legs.gradient, with_way_home(free, home))
             upper = np.concatenate(
                 (1.0 - self._rows.state @ state, bounds, room.ravel() / LEG_UNIT)
             )

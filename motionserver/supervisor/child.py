@@ -7,6 +7,7 @@ import logging
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -29,6 +30,7 @@ class Child:
         wanted: False once it shall not be started again.
         restarts: How often it was started again.
         exits: Exit status of each life.
+        may_start: Asked before each start after the first; it waits while the answer is no.
     """
 
     name: str
@@ -37,6 +39,7 @@ class Child:
     wanted: bool = True
     restarts: int = 0
     exits: list[int] = field(default_factory=list)
+    may_start: Callable[[], bool] = lambda: True
     _process: asyncio.subprocess.Process | None = None
 
     @property
@@ -53,14 +56,16 @@ class Child:
             process = await self._start()
             status = await process.wait()
             self.exits.append(status)
-            if not self.wanted:
-                return
             quick = time.monotonic() - began < QUICK
             pause = min(SLOWEST, max(0.1, 2.0 * pause)) if quick else 0.0
+            if not self.wanted:
+                break
             self.restarts += 1
             log.warning("%s ended with %s; starting it again", self.name, status)
             if self.restarts > 1 and pause:
                 await asyncio.sleep(pause)
+            while self.wanted and not self.may_start():
+                await asyncio.sleep(0.05)
 
     async def _start(self) -> asyncio.subprocess.Process:
         environment = dict(os.environ)

@@ -13,9 +13,10 @@ import socket
 from pathlib import Path
 from typing import Any, Final, TextIO
 
+from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
 from motionserver.supervisor.child import Child
-from motionserver.telemetry.link import Maps
+from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
@@ -57,6 +58,7 @@ class Service:
         guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
         self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
         self.planner = Child("planner", ("-m", "motionserver.planner", str(run_dir)))
+        self.planner.may_start = self._is_not_cued
         self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
         self.web.wanted = config_web
         self._leave = asyncio.Event()
@@ -138,6 +140,11 @@ class Service:
                 await asyncio.sleep(0.5)
                 return
             await asyncio.sleep(0.05)
+
+    def _is_not_cued(self) -> bool:
+        """A planner that died is replaced once the platform parks: its successor knows nothing."""
+        message = self._maps.clock.read()
+        return message is None or STATES[GuardClock.unpack(message[1]).state] not in CUED
 
     def _active(self) -> tuple[Child, Child]:
         """The guard that holds the lock, by its own word, and the other."""

