@@ -96,5 +96,9 @@ def make_cost(plant: Plant, tuning: Tuning) -> Cost:
     # a solver needs strict convexity whatever the weights
     hessian += 1e-6 * np.eye(inputs)
     return Cost(
-        frozen(hessian), frozen(from_state), frozen(from_error), frozen(from_input), frozen(from_last)
+        frozen(hessian),
+        frozen(from_state),
+        frozen(from_error),
+        frozen(from_input),
+        frozen(from_last),
     )
