@@ -1,4 +1,4 @@
-"""Entry of the guard process: ``python -m motionserver.guard RUN_DIR SOCKET_FD``."""
+"""Entry of the guard process: ``python -m motionserver.guard RUN_DIR SOCKET_FD [leave]``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def main() -> int:
     link = open_link(descriptor)
     with (run_dir / "guard.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return asyncio.run(GuardLoop(options, run_dir, link).run())
+        loop = GuardLoop(options, run_dir, link)
+        if sys.argv[3:] == ["leave"]:
+            loop.ask_to_leave("its predecessor died while parking")
+        return asyncio.run(loop.run())
 
 
 if __name__ == "__main__":

@@ -67,6 +67,7 @@ class GuardLoop:
         self._snapshot_ns = 0
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
+        self._start_ns = now_ns()
 
     async def run(self) -> int:
         """Run until told to leave and parked.
@@ -76,7 +77,7 @@ class GuardLoop:
         """
         loop = asyncio.get_running_loop()
         self._done = loop.create_future()
-        loop.add_signal_handler(signal.SIGTERM, self._ask_to_leave, "terminated")
+        loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         gc.collect()
         gc.freeze()
@@ -92,7 +93,8 @@ class GuardLoop:
         finally:
             ticker.close()
 
-    def _ask_to_leave(self, why: str) -> None:
+    def ask_to_leave(self, why: str) -> None:
+        """Park and end; asking again does not hurry it."""
         if not self._leave:
             self.guard.record.note(now_ns(), f"leaving: {why}")
         self._leave = True

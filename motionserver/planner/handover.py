@@ -14,7 +14,7 @@ from motionserver.telemetry.link import STATES, GuardClock, Maps
 SECOND: Final = 1_000_000_000
 ALIVE_NS: Final = 200_000_000
 KEPT: Final = 16
-PATIENCE: Final = 3
+PATIENCE: Final = 1
 CONFIDENCE: Final = 300
 MOST_LEAD: Final = 3
 

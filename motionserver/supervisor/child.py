@@ -53,7 +53,7 @@ class Child:
         pause = 0.0
         while self.wanted:
             began = time.monotonic()
-            process = await self._start()
+            process = await self.start()
             status = await process.wait()
             self.exits.append(status)
             quick = time.monotonic() - began < QUICK
@@ -67,7 +67,17 @@ class Child:
             while self.wanted and not self.may_start():
                 await asyncio.sleep(0.05)
 
-    async def _start(self) -> asyncio.subprocess.Process:
+    async def ended(self, patience: float) -> int:
+        """Wait for its end, at most ``patience`` [s]; its exit status, 0 if it never lived.
+
+        Raises:
+            TimeoutError: It lives on.
+        """
+        process = self._process
+        return 0 if process is None else await asyncio.wait_for(process.wait(), patience)
+
+    async def start(self, *more: str) -> asyncio.subprocess.Process:
+        """Start it once, with ``more`` arguments behind its own."""
         environment = dict(os.environ)
         # one thread per process: a solver that spreads over the cores disturbs the guard
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -75,6 +85,7 @@ class Child:
         process = await asyncio.create_subprocess_exec(
             sys.executable,
             *self.arguments,
+            *more,
             pass_fds=self.descriptors,
             env=environment,
             stdin=asyncio.subprocess.DEVNULL,

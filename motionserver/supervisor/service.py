@@ -116,30 +116,22 @@ class Service:
     async def _park(self) -> int:
         """Let the active guard park; the spare goes first, it has nothing to do."""
         active, spare = self._active()
+        active.wanted = spare.wanted = False
         await spare.end(signal.SIGKILL, 1.0)
-        deadline = now_ns() + int(PARK_PATIENCE * 1e9)
-        before = len(active.exits)
+        deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
         active.signal(signal.SIGTERM)
-        while now_ns() < deadline:
-            if len(active.exits) > before:
-                status = active.exits[-1]
-                if status in (0, 3):
-                    active.wanted = False
-                    return status
-                # it was killed while parking: its successor must park too
-                before = len(active.exits)
-                await self._wait_alive(active)
-            active.signal(signal.SIGTERM)
-            await asyncio.sleep(0.1)
+        while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
+            try:
+                status = await active.ended(left)
+            except TimeoutError:
+                break
+            if status in (0, 3):
+                return status
+            # it was killed while parking: its successor must park too
+            log.warning("%s ended with %s while parking; starting it again", active.name, status)
+            await active.start("leave")
         await active.end(signal.SIGKILL, 1.0)
         return 3
-
-    async def _wait_alive(self, child: Child) -> None:
-        for _ in range(200):
-            if child.pid is not None:
-                await asyncio.sleep(0.5)
-                return
-            await asyncio.sleep(0.05)
 
     def _is_not_cued(self) -> bool:
         """A planner that died is replaced once the platform parks: its successor knows nothing."""
