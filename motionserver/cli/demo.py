@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from motion_clients.recording import recording_names
+
 from motionserver.cli.demo_faults import FAULTS, send_nan
 from motionserver.cli.demo_show import line, verdict_text
 from motionserver.cli.serving import make_service

@@ -8,8 +8,9 @@ import logging
 import sys
 from pathlib import Path
 
-from motionserver.guard.loop import GuardLoop, open_link
+from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import read_options
+from motionserver.guard.ports import open_link
 from motionserver.telemetry.parent import follow_parent
 
 

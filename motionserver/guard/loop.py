@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import gc
 import logging
-import os
 import signal
 import socket
-import struct
 from collections import deque
 from pathlib import Path
 from typing import Final
 
-from motionserver.core.device import Feedback
-from motionserver.core.plan import Plan, pack, unpack
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.states import RAISED, State
 from motionserver.core.safety.supervisor import is_standing
-from motionserver.core.safety.watchdog import CueStatus
 from motionserver.guard.options import GuardOptions
+from motionserver.guard.ports import Ports
 from motionserver.guard.snapshot import snapshot
-from motionserver.platforms.base import PlatformPacketError
-from motionserver.platforms.registry import make_platform
-from motionserver.telemetry.link import STATES, GuardClock, Maps, unpack_cue
+from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
 
 SLOWEST_TICK_HZ: Final = 240.0
-DRAIN: Final = 64
 SNAPSHOT_NS: Final = 30_000_000
 SECOND: Final = 1_000_000_000
 
@@ -44,9 +36,7 @@ class GuardLoop:
     def __init__(self, options: GuardOptions, run_dir: Path, link: socket.socket) -> None:
         self.options = options
         self.guard = Guard(options.guard)
-        self._format = make_platform(options.format, options.options)
-        self._link = link
-        self._maps = Maps(run_dir)
+        self._ports = Ports(options, run_dir, link, self.guard.record.counters)
         self._requests = RequestServer(run_dir / "guard.sock")
         ticks = 1
         while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
@@ -55,11 +45,7 @@ class GuardLoop:
         self._tick_ns = SECOND / (ticks * options.rate_hz)
         self._lateness = Lateness(int(self._tick_ns))
         self._leave = False
-        self._seen_proposal = self._maps.proposal.newest_sequence()
-        self._seen_cue = 0
         self._seen_event = 0
-        self._accepted_id = 0
-        self._rejected_id = 0
         self._last_ns = 0
         self._tick = 0
         self._sent_slot = -1
@@ -68,6 +54,7 @@ class GuardLoop:
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
         self._start_ns = now_ns()
+        self.scheduling = ""
 
     async def run(self) -> int:
         """Run until told to leave and parked.
@@ -82,12 +69,14 @@ class GuardLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
+        self.scheduling = take_priority(50, self.options.realtime)
         ticker = Ticker(self._wake)
         self._start_ns = now_ns()
         self._last_ns = self._start_ns
         self._ticker = ticker
         ticker.arm(int(self._start_ns + self._tick_ns))
-        log.info("guard ready, limits %s of %s", self.guard.machine.digest, self.guard.machine.name)
+        machine = self.guard.machine
+        log.info("guard ready, limits %s of %s; %s", machine.digest, machine.name, self.scheduling)
         try:
             return await self._done
         finally:
@@ -122,9 +111,9 @@ class GuardLoop:
             now_ns=now,
             gap=(now - self._last_ns) / SECOND,
             is_due=is_due,
-            feedback=self._feedback(),
-            cue=self._cue(),
-            proposal=self._proposal(),
+            feedback=self._ports.feedback(),
+            cue=self._ports.cue(),
+            proposal=self._ports.proposal(),
             requests=tuple(Request(m["op"], str(m.get("by", "console"))) for m, _ in requests),
             leave=self._leave,
         )
@@ -136,8 +125,9 @@ class GuardLoop:
             if self._sent_slot >= 0:
                 counters["missed_slots"] += send_slot - self._sent_slot - 1
             self._sent_slot = send_slot
-            self._publish(now, send_slot)
-            self._send(setpoint)
+            due = self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns
+            self._ports.publish(now, int(due), self.guard.record)
+            self._ports.send(setpoint)
             self._sends.append(now)
             self._setpoint = setpoint
         record = self.guard.record
@@ -147,86 +137,13 @@ class GuardLoop:
         self._log_events()
         if self._setpoint is not None and now - self._snapshot_ns > SNAPSHOT_NS:
             self._snapshot_ns = now
-            self._maps.guard.write(
-                snapshot(
-                    self.guard, self.options, self._setpoint, self._lateness, self._rates(), now
-                )
+            ticks = {**self._lateness.summary(), "scheduling": self.scheduling}
+            self._ports.show(
+                snapshot(self.guard, self.options, self._setpoint, ticks, self._rates(), now)
             )
         if record.state is State.PARKED and slot % 4096 == 0:
             gc.collect()
         self._maybe_end(now)
-
-    def _feedback(self) -> tuple[Feedback, ...]:
-        out: list[Feedback] = []
-        counters = self.guard.record.counters
-        for _ in range(DRAIN):
-            try:
-                data, peer = self._link.recvfrom(2048)
-            except (BlockingIOError, ConnectionError):
-                break
-            if peer[0] != self.options.peer[0] or peer[1] != self.options.peer[1]:
-                counters["feedback_foreign"] += 1
-                continue
-            try:
-                out.append(self._format.decode(data, now_ns()))
-                counters["feedback"] += 1
-            except PlatformPacketError as error:
-                counters[error.reason] += 1
-        return tuple(out)
-
-    def _cue(self) -> CueStatus | None:
-        if self._maps.cue.newest_sequence() == self._seen_cue:
-            return None
-        message = self._maps.cue.read()
-        if message is None:
-            return None
-        self._seen_cue = message[0]
-        try:
-            return unpack_cue(message[1])
-        except (ValueError, struct.error):
-            self.guard.record.counters["cue_malformed"] += 1
-            return None
-
-    def _proposal(self) -> Plan | None:
-        if self._maps.proposal.newest_sequence() == self._seen_proposal:
-            return None
-        message = self._maps.proposal.read()
-        if message is None:
-            return None
-        self._seen_proposal = message[0]
-        try:
-            return unpack(message[1])
-        except ValueError:
-            self.guard.record.counters["rejected_malformed"] += 1
-            self.guard.record.counters["plans_rejected"] += 1
-            return None
-
-    def _publish(self, now: int, send_slot: int) -> None:
-        """Tell the planner what is accepted, before the packet goes out."""
-        playback = self.guard.record.playback
-        newest = None if playback is None else playback.newest.plan
-        if newest is not None and newest.plan_id != self._accepted_id:
-            self._maps.accepted.write(pack(newest))
-            self._accepted_id = newest.plan_id
-        due = int(self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns)
-        self._maps.clock.write(
-            GuardClock(
-                STATES.index(self.guard.record.state),
-                0 if newest is None else newest.plan_id,
-                0.0 if playback is None else playback.newest_clock,
-                now,
-                due,
-                self._rejected_id,
-                now,
-            ).pack()
-        )
-
-    def _send(self, setpoint: Setpoint) -> None:
-        try:
-            self._link.sendto(self._format.encode(setpoint), self.options.peer)
-            self.guard.record.counters["packets_sent"] += 1
-        except OSError:
-            self.guard.record.counters["send_errors"] += 1
 
     def _rates(self) -> dict[str, float]:
         sends = self._sends
@@ -254,12 +171,3 @@ class GuardLoop:
             self._done.set_result(0)
         elif record.state not in RAISED | {State.OFFLINE} and is_standing(record.playback):
             self._done.set_result(3)
-
-
-def open_link(descriptor: int) -> socket.socket:
-    """The platform's socket, inherited from the supervisor."""
-    link = socket.socket(fileno=os.dup(descriptor))
-    link.setblocking(False)
-    with contextlib.suppress(OSError):
-        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16384)
-    return link

@@ -23,6 +23,7 @@ class GuardOptions:
         peer: Address of the platform.
         rate_hz: Packets per second [Hz].
         unchecked: Names of limits that the machine's file does not state.
+        realtime: True: ask for real-time scheduling.
     """
 
     guard: GuardConfig
@@ -31,6 +32,7 @@ class GuardOptions:
     peer: tuple[str, int]
     rate_hz: float
     unchecked: tuple[str, ...]
+    realtime: bool
 
 
 def read_options(run_dir: Path) -> GuardOptions:
@@ -52,4 +54,5 @@ def read_options(run_dir: Path) -> GuardOptions:
         peer=(platform["host"], platform["port"]),
         rate_hz=platform["rate_hz"],
         unchecked=tuple(data["unchecked"]),
+        realtime=data["realtime"],
     )

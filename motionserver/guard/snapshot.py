@@ -12,7 +12,6 @@ from motionserver.core.kinematics.hexapod import leg_motion
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.guard.options import GuardOptions
-from motionserver.telemetry.ticker import Lateness
 
 
 def _numbers(values: Array) -> list[float]:
@@ -23,7 +22,7 @@ def snapshot(
     guard: Guard,
     options: GuardOptions,
     setpoint: Setpoint,
-    lateness: Lateness,
+    ticks: dict[str, object],
     rates: dict[str, float],
     now_ns: int,
 ) -> bytes:
@@ -33,7 +32,7 @@ def snapshot(
         guard: The guard.
         options: What it was told.
         setpoint: What was sent last.
-        lateness: Of its ticks.
+        ticks: Figures of its ticks.
         rates: Measured rates, by name [Hz].
         now_ns: Now [ns].
     """
@@ -93,7 +92,7 @@ def snapshot(
             },
             "counters": dict(record.counters),
             "rates_hz": rates,
-            "tick": lateness.summary(),
+            "tick": ticks,
             "rejections": [
                 {
                     "t_ns": when,

@@ -28,6 +28,7 @@ from motionserver.planner.options import PlannerOptions
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.link import STATES, Maps, pack_cue
+from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Ticker, now_ns
 
@@ -73,6 +74,7 @@ class PlannerLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
+        self.scheduling = take_priority(30, self.options.realtime)
         self._ticker = Ticker(self._wake)
         self._arm(now_ns())
         log.info("planner ready: %s", self._thinker.tuning.algorithm)

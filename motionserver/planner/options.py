@@ -45,6 +45,7 @@ class PlannerOptions:
         inputs: The sources.
         tuning: Tunables at the start, in the units of the page.
         tuning_file: Where the tuning in force survives a restart of the planner.
+        realtime: True: ask for real-time scheduling.
     """
 
     machine: Machine
@@ -55,6 +56,7 @@ class PlannerOptions:
     inputs: tuple[InputOptions, ...]
     tuning: dict[str, Any]
     tuning_file: Path
+    realtime: bool
 
 
 def read_options(run_dir: Path) -> PlannerOptions:
@@ -81,4 +83,5 @@ def read_options(run_dir: Path) -> PlannerOptions:
         inputs=inputs,
         tuning=planner["tuning"],
         tuning_file=run_dir / "tuning.json",
+        realtime=data["realtime"],
     )

@@ -35,6 +35,7 @@ class ServerSection(Strict):
     run_dir: str = ""
     state_dir: str = ""
     log_level: Literal["debug", "info", "warning"] = "info"
+    realtime: bool = True
 
 
 class PlatformSection(Strict):

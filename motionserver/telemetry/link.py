@@ -14,7 +14,7 @@ from motionserver.core.state import DriveMode
 from motionserver.telemetry.mapped import MappedFile
 
 STATES: Final = tuple(State)
-_CLOCK: Final = struct.Struct("<BQdQQQQ")
+_CLOCK: Final = struct.Struct("<BQdQQQ")
 _CUE: Final = struct.Struct("<QQBQ")
 _PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 
@@ -29,7 +29,6 @@ class GuardClock:
         newest_clock: That plan's own time at the last send [s]; negative while it waits.
         sent_ns: When the last packet was sent [ns].
         due_ns: When the next one is due [ns].
-        rejected_id: Number of the last rejected proposal.
         written_ns: When this was written [ns].
     """
 
@@ -38,7 +37,6 @@ class GuardClock:
     newest_clock: float
     sent_ns: int
     due_ns: int
-    rejected_id: int
     written_ns: int
 
     def pack(self) -> bytes:
