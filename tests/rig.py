@@ -276,9 +276,7 @@ class Rig:
         def send() -> None:
             prompt()
             path = recording_path(recording)
-            replay(
-                path, "127.0.0.1", port or self.cue_port, fmt=fmt, stop=stop, loop=True, **more
-            )
+            replay(path, "127.0.0.1", port or self.cue_port, fmt=fmt, stop=stop, loop=True, **more)
 
         thread = threading.Thread(target=send, daemon=True)
         self._drives.append((thread, stop))
