@@ -15,8 +15,11 @@ from motion_clients.replay import replay as send_recording
 
 from motionserver.errors import ConfigError
 from motionserver.settings.config import split_address
+from motionserver.telemetry.realtime import take_priority
 
 EMULATORS = ("moog-6dof2000e",)
+EMULATOR_FIFO = 20
+"""Real-time priority asked for: a real base has a computer of its own, this one must share."""
 
 
 def _address(option: str, text: str) -> tuple[str, int]:
@@ -36,10 +39,11 @@ def emulate(
     seed: int,
     cut_after: float | None,
 ) -> dict[str, object]:
-    """Be a device until a signal; returns the judge's verdict."""
+    """Be a device until a signal, as punctual as permitted; returns the judge's verdict."""
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)
+    take_priority(EMULATOR_FIFO, True)
     cut = LinkFlaws()
     if cut_after is not None:
         begin = time.monotonic() + cut_after
