@@ -94,9 +94,7 @@ def steady(gate: Gate, count: int = 20, delay: float = 5.0) -> float:
 def test_a_burst_after_a_stall_is_old_but_for_its_newest() -> None:
     gate = Gate()
     now = steady(gate) + 300.0
-    verdicts = [
-        gate.refuse(*A, motion(now, k, sent_ms=10.0 * k)) for k in range(20, 20 + 30)
-    ]
+    verdicts = [gate.refuse(*A, motion(now, k, sent_ms=10.0 * k)) for k in range(20, 20 + 30)]
     # the stall ends at 495 ms; the quickest delay is 5 ms; older than 50 ms is old
     assert verdicts == ["old"] * 25 + [None] * 5 or verdicts == ["old"] * 24 + [None] * 6
 
