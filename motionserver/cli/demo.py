@@ -77,7 +77,7 @@ class Demo:
         serving = asyncio.create_task(service.run())
         try:
             token = asyncio.create_task(self._drive(service, folder, cue))
-            showing = asyncio.create_task(self._show(service, folder / "run"))
+            showing = asyncio.create_task(self._show(folder / "run"))
             status = await serving
             token.cancel()
             showing.cancel()
@@ -94,7 +94,7 @@ class Demo:
     async def _drive(self, service: Service, folder: Path, cue: int) -> None:
         """Wait for the base, begin the drive, engage, break what shall be broken, end."""
         run_dir = folder / "run"
-        await self._until(run_dir, "PARKED")
+        await self._until("PARKED")
         if self.page:
             tokens = folder / "tokens.json"
             for _ in range(100):
@@ -113,7 +113,7 @@ class Demo:
                 if answer["ok"]:
                     break
             await asyncio.sleep(0.1)
-        await self._until(run_dir, "RUN")
+        await self._until("RUN")
         if self.fault:
             await asyncio.sleep(self._fault_at())
             await self._break(service, replay, cue)
@@ -122,7 +122,7 @@ class Demo:
             await asyncio.sleep(max(0.0, self.seconds - passed))
             service.leave()
         elif self.fault:
-            await self._until(run_dir, FAULTS[self.fault])
+            await self._until(FAULTS[self.fault])
             await asyncio.sleep(4.0)
             service.leave()
 
@@ -136,11 +136,11 @@ class Demo:
         if victim is not None:
             victim.signal(signal.SIGKILL)
 
-    async def _until(self, run_dir: Path, state: str) -> None:
+    async def _until(self, state: str) -> None:
         while state not in self._states[-1:]:
-            await asyncio.sleep(0.02)
+            await asyncio.sleep(0.02)  # noqa: ASYNC110 - another process's state is polled
 
-    async def _show(self, service: Service, run_dir: Path) -> None:
+    async def _show(self, run_dir: Path) -> None:
         guard, planner = MappedFile(run_dir / "guard.map"), MappedFile(run_dir / "planner.map")
         tick = 0
         while True:

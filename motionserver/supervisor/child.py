@@ -48,24 +48,28 @@ class Child:
         process = self._process
         return process.pid if process is not None and process.returncode is None else None
 
+    def is_wanted(self) -> bool:
+        """Whether it shall still run; others change that while `keep` waits."""
+        return self.wanted
+
     async def keep(self) -> None:
         """Start it, and again whenever it ends, until it is not wanted any more."""
         pause = 0.0
-        while self.wanted:
+        while self.is_wanted():
             began = time.monotonic()
             process = await self.start()
             status = await process.wait()
             self.exits.append(status)
             quick = time.monotonic() - began < QUICK
             pause = min(SLOWEST, max(0.1, 2.0 * pause)) if quick else 0.0
-            if not self.wanted:
+            if not self.is_wanted():
                 break
             self.restarts += 1
             log.warning("%s ended with %s; starting it again", self.name, status)
             if self.restarts > 1 and pause:
                 await asyncio.sleep(pause)
-            while self.wanted and not self.may_start():
-                await asyncio.sleep(0.05)
+            while self.is_wanted() and not self.may_start():
+                await asyncio.sleep(0.05)  # noqa: ASYNC110 - another process's state is polled
 
     async def ended(self, patience: float) -> int:
         """Wait for its end, at most ``patience`` [s]; its exit status, 0 if it never lived.
