@@ -105,8 +105,8 @@ def _motion_routes(app: FastAPI, desk: Desk) -> None:
         if refusal is not None:
             desk.audit.note(op, caller, "not by HTTP")
             raise Refusal(403, f"engaging by HTTP is not possible: {refusal}", path,
-                          "engage = http with a loopback bind or an enable input",
-                          "engage at the platform")  # fmt: skip
+                          "[operator] engage = http, with a loopback bind or an enable input",
+                          "engage at the console")  # fmt: skip
         answer = await desk.guard.ask({"op": op, "by": "http"}, path)
         result = "done" if answer.get("ok") else str(answer.get("reason"))
         desk.audit.note(op, caller, result, state=answer.get("state"))

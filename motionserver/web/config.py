@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 from motionserver.core.limits import Machine, machine_from_mapping
+from motionserver.errors import MotionServerError
 
 LOOPBACK_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
-class WebConfigError(ValueError):
+class WebConfigError(MotionServerError):
     """The page cannot be served like this; the text says what to change."""
 
 
@@ -30,7 +31,8 @@ class WebConfig:
         presets_dir: Where the user's presets are kept.
         machine: `machine_to_mapping` of the machine in use.
         allowed_hosts: Names this server may be asked under, beside its own address.
-        engage: "local" = never by HTTP; "http" = by HTTP where `engage_refusal` agrees.
+        engage: "console" = at the console only; "http" = by HTTP too, where `engage_refusal`
+            agrees; "auto" = the guard engages by itself.
         enable_input: True if the platform has a configured enable input the guard reads.
         tls_cert: Certificate chain, PEM.
         tls_key: Its key, PEM.
@@ -43,7 +45,7 @@ class WebConfig:
     presets_dir: Path
     machine: Mapping[str, Any]
     allowed_hosts: tuple[str, ...] = ()
-    engage: Literal["local", "http"] = "local"
+    engage: Literal["console", "http", "auto"] = "console"
     enable_input: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
@@ -70,7 +72,7 @@ class WebConfig:
     def engage_refusal(self) -> str | None:
         """Why engaging by HTTP is not possible here; None if it is."""
         if self.engage != "http":
-            return "the configuration allows engaging at the platform only (engage = local)"
+            return f"the configuration does not allow it (engage = {self.engage})"
         if not (self.is_loopback or self.enable_input):
             return "engaging from another computer needs a configured enable input"
         return None

@@ -97,13 +97,15 @@ class Scene:
 
     def wanted(self, t):
         gain = self.book.model.scale if self.state == "RUN" else 0.0
-        x = 2.6 * math.sin(0.42 * t) * abs(math.sin(0.17 * t)) - 1.4 * (math.sin(0.9 * t) > 0.93)
+        x = 2.6 * math.sin(0.42 * t) * math.sin(0.17 * t) ** 2 - 0.8 * math.exp(
+            4 * (math.sin(0.9 * t) - 1)
+        )
         y = 2.1 * math.sin(0.31 * t + 1) + 0.5 * math.sin(1.9 * t) * math.cos(0.13 * t)
         z = 0.5 * math.sin(5.1 * t) * math.sin(0.7 * t) ** 2 + 0.25 * math.sin(11 * t)
         return gain * np.array([x, y, z])
 
     def pose(self, t):
-        f = self.wanted(t - 0.12)
+        f = self.wanted(t - 0.12) * [1, 1, 0.35]
         slow = self.wanted(t - 0.7)
         up = self.share()
         pose = np.array([
@@ -145,9 +147,9 @@ class Scene:
             "rates_hz": {"tick": 240.0, "send": 60.0, "planner": 100.0},
             "tick": {"late_p50_ms": 0.06, "late_p99_ms": 0.41, "late_max_ms": 2.3, "missed": 0},
             "rejections": [
-                {"t_ns": int((self.started + 4) * 1e9), "reason": "leg speed", "when": 0.312,
+                {"t_ns": int((self.started + 4) * 1e9), "reason": "leg-speed", "when": 0.312,
                  "leg": 3, "value": 0.613, "allowed": 0.6},
-                {"t_ns": int((self.started + 2) * 1e9), "reason": "leg length", "when": 1.104,
+                {"t_ns": int((self.started + 2) * 1e9), "reason": "leg-length", "when": 1.104,
                  "leg": 5, "value": 1.1817, "allowed": 1.1811},
             ],
             "events": self.events[-12:],
@@ -161,7 +163,8 @@ class Scene:
         wanted = self.wanted(t)
         rng = np.random.default_rng(self.tick)
         near = np.abs(q) / self.machine.box
-        x_max = self.machine.box * (1 - 0.45 * np.clip(near + 0.1, 0, 1) ** 2)
+        swing = 0.5 + 0.5 * np.sin(0.23 * t + np.arange(6))
+        x_max = self.machine.box * (1 - 0.5 * swing**4 - 0.1 * near)
         measured = (force + rng.normal(0, 0.06, 3)).tolist()
         return {
             "pid": os.getpid() + 1,

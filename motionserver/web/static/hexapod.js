@@ -25,8 +25,8 @@ export class Hexapod {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.pose = null;
-    this.turn = -0.62;
-    this.lift = 0.3;
+    this.turn = 0.5;
+    this.lift = 0.34;
     this.status = null;
     this.drag();
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -61,9 +61,9 @@ export class Hexapod {
     const [cl, sl] = [Math.cos(this.lift), Math.sin(this.lift)];
     const depth = x * ca + y * sa;
     const right = y * ca - x * sa;
-    const [up, far] = [(z - this.middle) * cl + depth * sl * -1, depth * cl + (z - this.middle) * sl];
+    const [up, far] = [(z - this.middle) * cl + depth * sl, depth * cl - (z - this.middle) * sl];
     const zoom = 7.2 / (7.2 + far);
-    const size = Math.min(this.height / 2.05, this.width / 3.5) * zoom;
+    const size = Math.min(this.height / 2.3, this.width / 3.3) * zoom;
     return [this.width / 2 - right * size, this.height * 0.5 - up * size, far];
   }
 
@@ -117,7 +117,7 @@ export class Hexapod {
     c.lineCap = "round";
     c.lineJoin = "round";
     const height = machine.neutral_height;
-    this.middle = height * 0.6;
+    this.middle = height * 0.56;
     this.floor();
     const base = machine.base_joints;
     const carried = (points, pose) => {
@@ -151,7 +151,7 @@ export class Hexapod {
       this.line(this.project([k, -1.8, 0]), this.project([k, 1.8, 0]), "rgba(143,161,179,.10)", 1);
       this.line(this.project([-1.8, k, 0]), this.project([1.8, k, 0]), "rgba(143,161,179,.10)", 1);
     }
-    const ahead = this.project([2.0, 0, 0]);
+    const ahead = this.project([2.1, 0, 0]);
     this.label(ahead, "front", "rgba(159,173,186,.8)");
   }
 

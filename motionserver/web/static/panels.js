@@ -15,7 +15,7 @@ export function showState(status) {
   put(byId("reason"), String(status.reason || "–"));
   const since = status.guard?.since_ns;
   put(byId("since"), isNumber(since) ? `for ${duration((status.t_ns - since) / 1e9)}` : "–");
-  put(byId("algorithm"), status.algorithm ? `algorithm ${status.algorithm}` : "no planner");
+  put(byId("algorithm"), (status.algorithm ? `algorithm ${status.algorithm}` : "no planner") + (status.guard?.dry_run ? " · dry run: nothing moves" : ""));
   put(byId("machine"), String(status.machine?.name || "–"));
   put(byId("digest"), status.guard?.limits?.digest ? `limits ${status.guard.limits.digest}` : "");
   document.title = `${status.state} – motionserver`;
@@ -100,7 +100,7 @@ export function showLog(status) {
   const ago = (ns) => (isNumber(ns) ? `${duration((status.t_ns - ns) / 1e9)} ago` : "–");
   const newest = (items) => list(items).slice().sort((a, b) => b.t_ns - a.t_ns);
   lines(byId("rejections"), newest(status.guard?.rejections).map((r) => [ago(r.t_ns),
-    `${r.reason}${isNumber(r.leg) ? `, leg ${r.leg}` : ""} at ${fixed(r.when, 2)} s of the plan: ${short(r.value)}, allowed ${short(r.allowed)}`]), "None. Every plan passed.");
+    `${String(r.reason).replaceAll("-", " ")}${isNumber(r.leg) ? `, leg ${r.leg + 1}` : ""}${isNumber(r.when) ? ` at ${fixed(r.when, 2)} s of the plan` : ""}${isNumber(r.value) ? `: ${short(r.value)}, allowed ${short(r.allowed)}` : ""}`]), "None. Every plan passed.");
   lines(byId("events"), newest(status.guard?.events).map((e) => [ago(e.t_ns), String(e.text)]), "Nothing yet.");
 }
 
