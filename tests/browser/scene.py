@@ -97,9 +97,8 @@ class Scene:
 
     def wanted(self, t):
         gain = self.book.model.scale if self.state == "RUN" else 0.0
-        x = 2.6 * math.sin(0.42 * t) * math.sin(0.17 * t) ** 2 - 0.8 * math.exp(
-            4 * (math.sin(0.9 * t) - 1)
-        )
+        x = 2.6 * math.sin(0.42 * t) * math.sin(0.17 * t) ** 2
+        x -= 0.8 * math.exp(4 * (math.sin(0.9 * t) - 1))
         y = 2.1 * math.sin(0.31 * t + 1) + 0.5 * math.sin(1.9 * t) * math.cos(0.13 * t)
         z = 0.5 * math.sin(5.1 * t) * math.sin(0.7 * t) ** 2 + 0.25 * math.sin(11 * t)
         return gain * np.array([x, y, z])

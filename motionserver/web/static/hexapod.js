@@ -63,8 +63,8 @@ export class Hexapod {
     const right = y * ca - x * sa;
     const [up, far] = [(z - this.middle) * cl + depth * sl, depth * cl - (z - this.middle) * sl];
     const zoom = 7.2 / (7.2 + far);
-    const size = Math.min(this.height / 2.3, this.width / 3.3) * zoom;
-    return [this.width / 2 - right * size, this.height * 0.5 - up * size, far];
+    const size = Math.min(this.height / 2.45, this.width / 3.5) * zoom;
+    return [this.width / 2 - right * size, this.height * 0.43 - up * size, far];
   }
 
   line(a, b, colour, width, dash = []) {
@@ -151,7 +151,7 @@ export class Hexapod {
       this.line(this.project([k, -1.8, 0]), this.project([k, 1.8, 0]), "rgba(143,161,179,.10)", 1);
       this.line(this.project([-1.8, k, 0]), this.project([1.8, k, 0]), "rgba(143,161,179,.10)", 1);
     }
-    const ahead = this.project([2.1, 0, 0]);
+    const ahead = this.project([2.5, 0, 0]);
     this.label(ahead, "front", "rgba(159,173,186,.8)");
   }
 
