@@ -31,8 +31,7 @@ class WebConfig:
         presets_dir: Where the user's presets are kept.
         machine: `machine_to_mapping` of the machine in use.
         allowed_hosts: Names this server may be asked under, beside its own address.
-        engage: "console" = at the console only; "http" = by HTTP too, where `engage_refusal`
-            agrees; "auto" = the guard engages by itself.
+        engage: "local" = never by HTTP; "http" = by HTTP where `engage_refusal` agrees.
         enable_input: True if the platform has a configured enable input the guard reads.
         tls_cert: Certificate chain, PEM.
         tls_key: Its key, PEM.
@@ -45,7 +44,7 @@ class WebConfig:
     presets_dir: Path
     machine: Mapping[str, Any]
     allowed_hosts: tuple[str, ...] = ()
-    engage: Literal["console", "http", "auto"] = "console"
+    engage: Literal["local", "http"] = "local"
     enable_input: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
@@ -72,7 +71,7 @@ class WebConfig:
     def engage_refusal(self) -> str | None:
         """Why engaging by HTTP is not possible here; None if it is."""
         if self.engage != "http":
-            return f"the configuration does not allow it (engage = {self.engage})"
+            return "the configuration does not allow it ([operator] engage is not http)"
         if not (self.is_loopback or self.enable_input):
             return "engaging from another computer needs a configured enable input"
         return None

@@ -178,13 +178,25 @@ class Scene:
                        "rate_hz": 99.8, "mode": "DRIVE", "fresh": True, "session": 71},
             "solver": {"backend": self.book.model.backend, "time_p50_ms": 1.3,
                        "time_p99_ms": 2.4, "last_ms": 1.2, "iterations": 27, "status": "solved"},
-            "kappa": 1.0, "refused": 3, "halved": 41,
-            "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0},
+            "kappa": 1.0,
+            "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0, "plans_halved": 41,
+                         "plans_refused": 3},
             "tuning": {"version": self.book.version, "values": self.book.model.model_dump()},
             "disturbance": [0.0, 0.0, 0.0],
             "rates_hz": {"planner": 100.0},
-            "tracking": None,
+            "tracking": {"mismatch": 0.061, "alarm": False}, "trouble": "",
         }  # fmt: skip
+
+    def service(self):
+        return {
+            "pid": os.getpid() + 2,
+            "t_ns": time.monotonic_ns(),
+            "guard": os.getpid(),
+            "spare": os.getpid() + 3,
+            "planner": os.getpid() + 1,
+            "web": None,
+            "restarts": {"guard": 0, "planner": 1, "web": 0},
+        }
 
 
 class Peers:
@@ -194,6 +206,7 @@ class Peers:
         self.scene = scene
         self._guard = MappedFile(run_dir / wiring.GUARD_SNAPSHOT, CAPACITY)
         self._planner = MappedFile(run_dir / wiring.PLANNER_SNAPSHOT, CAPACITY)
+        self._service = MappedFile(run_dir / wiring.SERVICE_SNAPSHOT, CAPACITY)
         self._guard_requests = RequestServer(run_dir / wiring.GUARD_REQUESTS)
         self._planner_requests = RequestServer(run_dir / wiring.PLANNER_REQUESTS)
         self._end = threading.Event()
@@ -206,7 +219,9 @@ class Peers:
     def __exit__(self, *_):
         self._end.set()
         self._thread.join()
-        for item in (self._guard, self._planner, self._guard_requests, self._planner_requests):
+        self._guard_requests.close()
+        self._planner_requests.close()
+        for item in (self._guard, self._planner, self._service):
             item.close()
 
     def _run(self):
@@ -214,6 +229,7 @@ class Peers:
         while not self._end.wait(0.02):
             scene.tick += 1
             scene.advance()
+            self._service.write(json.dumps(scene.service()).encode())
             if "guard" not in scene.dead:
                 for request, address in self._guard_requests.poll():
                     self._guard_requests.answer(address, scene.answer_guard(request))

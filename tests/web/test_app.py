@@ -25,6 +25,9 @@ class Newest:
         return self.make()
 
 
+NONE = Newest(lambda: None)
+
+
 class World:
     """The application with a guard and a planner that answer at once, and a clock of our own."""
 
@@ -50,6 +53,7 @@ class World:
             self.config,
             Newest(self.scene.guard),
             Newest(self.scene.planner),
+            Newest(self.scene.service),
             self.ask(self.scene.answer_guard),
             self.ask(lambda request: self.scene.book.answer(request)),
         )
@@ -260,8 +264,7 @@ def test_engage_and_park_reach_the_guard_and_are_written_down(world):
 @pytest.mark.parametrize(
     ("more", "status"),
     [
-        ({"engage": "console"}, 403),
-        ({"engage": "auto"}, 403),
+        ({"engage": "local"}, 403),
         ({"engage": "http"}, 200),
         ({"host": "192.0.2.1", "allowed_hosts": ("127.0.0.1",)}, 403),
         ({"host": "192.0.2.1", "allowed_hosts": ("127.0.0.1",), "enable_input": True}, 200),
@@ -406,7 +409,9 @@ def test_status_says_what_it_must(world):
     data = world.client().get("/api/status").json()
     assert (data["state"], data["algorithm"]) == ("PARKED", "thondel2014")
     assert len(data["x_max"]) == 6
-    assert set(data["processes"]) == {"guard", "planner", "web"}
+    assert set(data["processes"]) == {"guard", "planner", "web", "spare", "service"}
+    assert data["processes"]["spare"]["alive"] is True
+    assert data["processes"]["planner"]["restarts"] == 1
     assert all({"pid", "alive"} <= set(p) for p in data["processes"].values())
     assert data["rates_hz"]["send"] == 60.0
     assert data["counters"]["plans_rejected"] == 3
@@ -417,7 +422,7 @@ def test_dead_and_absent_processes_are_named(world):
     guard = world.scene.guard() | {"t_ns": time.monotonic_ns() - 3_000_000_000}
     world.scene.guard = lambda: guard
     app = build_app(
-        world.config, Newest(lambda: guard), Newest(lambda: None), lambda _: {}, lambda _: {}
+        world.config, Newest(lambda: guard), Newest(lambda: None), NONE, lambda _: {}, lambda _: {}
     )
     client = TestClient(app, base_url="http://127.0.0.1:8080", client=HERE)
     data = client.get("/api/status").json()
@@ -431,7 +436,12 @@ def test_dead_and_absent_processes_are_named(world):
 def test_numbers_that_are_not_finite_become_null(world):
     planner = world.scene.planner() | {"kappa": math.nan, "x_max": [math.inf] * 6}
     app = build_app(
-        world.config, Newest(lambda: None), Newest(lambda: planner), lambda _: {}, lambda _: {}
+        world.config,
+        Newest(lambda: None),
+        Newest(lambda: planner),
+        NONE,
+        lambda _: {},
+        lambda _: {},
     )
     client = TestClient(app, base_url="http://127.0.0.1:8080", client=HERE)
     assert client.get("/api/status").json()["x_max"] == [None] * 6
@@ -456,7 +466,7 @@ def test_hostile_text_of_the_device_stays_text(world):
     guard = world.scene.guard() | {"reason": hostile}
     world.scene.guard = lambda: guard
     app = build_app(
-        world.config, Newest(lambda: guard), Newest(lambda: None), lambda _: {}, lambda _: {}
+        world.config, Newest(lambda: guard), Newest(lambda: None), NONE, lambda _: {}, lambda _: {}
     )
     answer = TestClient(app, base_url="http://127.0.0.1:8080", client=HERE).get("/api/status")
     assert answer.headers["content-type"] == "application/json"

@@ -44,7 +44,7 @@ class Clock:
 
 def test_status_is_computed_once_per_50_ms_for_all_readers(tmp_path):
     guard, clock = Counted(), Clock()
-    board = StatusBoard(guard, Counted(), config(tmp_path), clock)
+    board = StatusBoard(guard, Counted(), Counted(), config(tmp_path), clock)
     texts = {board.current().text for _ in range(100)}
     assert (len(texts), guard.reads) == (1, 1)
     clock.ns += 49_000_000
@@ -61,12 +61,12 @@ class Broken:
 
 
 def test_an_unreadable_snapshot_is_as_good_as_none(tmp_path):
-    board = StatusBoard(Broken(), Broken(), config(tmp_path), Clock())
+    board = StatusBoard(Broken(), Broken(), Broken(), config(tmp_path), Clock())
     assert board.current().data["state"] == "UNKNOWN"
 
 
 async def test_streams_are_bounded_and_counted(tmp_path):
-    streams = Streams(StatusBoard(Counted(), Counted(), config(tmp_path), Clock()))
+    streams = Streams(StatusBoard(Counted(), Counted(), Counted(), config(tmp_path), Clock()))
     bodies = [streams.open("/api/stream").body_iterator for _ in range(MOST_READERS)]
     for body in bodies:
         assert await anext(body) == b"retry: 1000\n\n"

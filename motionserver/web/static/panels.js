@@ -34,7 +34,8 @@ function processes(all) {
     }
     pill.className = `pill ${process.alive ? "good" : "bad"}`;
     pill.title = isNumber(process.pid) ? `process ${process.pid}` : "";
-    put(pill, process.alive ? name : `${name} ${isNumber(process.age_s) ? `silent ${duration(process.age_s)}` : "absent"}`);
+    const again = process.restarts ? ` · ${process.restarts} restart${process.restarts > 1 ? "s" : ""}` : "";
+    put(pill, process.alive ? name + again : `${name} ${isNumber(process.age_s) ? `silent ${duration(process.age_s)}` : "absent"}`);
   }
 }
 
@@ -75,8 +76,10 @@ export function showNumbers(status) {
     ["Tick late max, missed", `${fixed(tick.late_max_ms, 1)} ms, ${fixed(tick.missed, 0)}`, tick.missed > 0],
     ["Plan share κ", fixed(p.kappa ?? g.plan?.kappa, 3)],
     ["Tracking error", isNumber(g.tracking_error) ? fixed(1e3 * g.tracking_error, 2, "mm") : "–"],
-    ["Plans halved, refused", `${fixed(p.halved, 0)}, ${fixed(p.refused, 0)}`],
+    ["Plans halved, refused", `${fixed(p.halved ?? p.counters?.plans_halved ?? 0, 0)}, ${fixed(p.refused ?? p.counters?.plans_refused ?? 0, 0)}`],
     ["Plan played", g.plan ? `${g.plan.id}: ${fixed(g.plan.time, 2)} of ${fixed(g.plan.duration, 2)} s` : "–"],
+    ...(isNumber(p.tracking?.mismatch) ? [["Measured against felt", fixed(p.tracking.mismatch, 2, "m/s²"), p.tracking.alarm]] : []),
+    ...[["Planner", p.trouble], ["Source error", source.last_error]].filter(([, text]) => text).map(([name, text]) => [name, text, true]),
     ...list(feedback.faults).map((fault) => ["Device fault", String(fault), true]),
   ]);
 }
