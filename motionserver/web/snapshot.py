@@ -113,8 +113,8 @@ def _processes(
 ) -> dict[str, dict[str, Any]]:
     """Who lives, by its own word; and the spare guard, by the service's."""
     found = {
-        "planner": _process(planner, now),
         "guard": _process(guard, now),
+        "planner": _process(planner, now),
         "web": {"pid": os.getpid(), "alive": True, "age_s": 0.0},
     }
     watching = _process(service, now)

@@ -104,6 +104,10 @@ export class Hexapod {
     c.font = "600 12px system-ui, sans-serif";
     c.textAlign = "center";
     c.textBaseline = "middle";
+    c.strokeStyle = "#151c23";
+    c.lineWidth = 4;
+    c.setLineDash([]);
+    c.strokeText(text, p[0], p[1]);
     c.fillText(text, p[0], p[1]);
   }
 
@@ -141,6 +145,7 @@ export class Hexapod {
       this.line(o, tip, colour, 2.2);
       this.label([tip[0] + (tip[0] - o[0]) * 0.16, tip[1] + (tip[1] - o[1]) * 0.16], name, colour);
     });
+    this.label(this.project([2.6, 0, 0]), "front", "#9fadba");
     this.dot(o, 8, "#0d1217");
     this.dot(o, 6.2, "#e8edf2");
   }
@@ -151,8 +156,6 @@ export class Hexapod {
       this.line(this.project([k, -1.8, 0]), this.project([k, 1.8, 0]), "rgba(143,161,179,.10)", 1);
       this.line(this.project([-1.8, k, 0]), this.project([1.8, k, 0]), "rgba(143,161,179,.10)", 1);
     }
-    const ahead = this.project([2.5, 0, 0]);
-    this.label(ahead, "front", "rgba(159,173,186,.8)");
   }
 
   legs(base, top, guard) {
