@@ -3,6 +3,7 @@ import { send, sentence } from "./api.js";
 import { byId, make, put } from "./dom.js";
 
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser"];
+const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
   constructor() {
@@ -30,8 +31,9 @@ export class Tuning {
   build(fields) {
     const groups = [...new Set([...ORDER, ...fields.map((f) => f.group)])];
     for (const group of groups) {
-      const column = make("section", "group");
-      column.append(make("h3", "", group));
+      const column = make("details", "group");
+      column.open = innerWidth > 720;
+      column.append(make("summary", "", group));
       for (const field of fields.filter((f) => f.group === group)) column.append(this.row(field));
       byId("fields").append(column);
     }
@@ -55,11 +57,11 @@ export class Tuning {
       input.inputMode = "decimal";
     }
     const help = make("p", "help", `${field.meaning} `);
-    if (!field.choices) help.append(make("span", "range", `${field.min} to ${field.max} ${field.unit}`.trim()));
+    if (!field.choices) help.append(make("span", "range", `${field.min} to ${field.max} ${unit(field)}`.trim()));
     const wrong = make("p", "wrong-text");
     wrong.hidden = true;
     box.append(name, input);
-    if (!field.choices) box.append(make("span", "unit", field.unit));
+    if (!field.choices) box.append(make("span", "unit", unit(field)));
     box.append(help, wrong);
     input.addEventListener("input", () => { this.mark(field.name, ""); this.refresh(); });
     this.rows.set(field.name, { field, box, input, wrong });
@@ -108,6 +110,7 @@ export class Tuning {
     put(byId("apply"), count ? `Apply ${count} change${count > 1 ? "s" : ""}` : "Apply");
     byId("apply").disabled = !count || !this.mayTune || this.busy;
     byId("discard").disabled = !count;
+    document.querySelector(".apply").classList.toggle("pending", count > 0);
     byId("undo").disabled = !this.mayTune || this.version === null || this.busy;
     byId("preset-save").disabled = !this.mayTune;
     byId("apply").title = this.mayTune ? "" : "needs the tuner's or operator's token";
@@ -134,8 +137,11 @@ export class Tuning {
       this.take(answer.body);
       this.say(done(answer.body));
     } else {
-      for (const item of answer.body.details || []) this.mark(item.field, `${item.message}; allowed ${item.allowed}`);
-      this.say(sentence(answer.body), true);
+      for (const item of answer.body.details || []) {
+        if (this.mark(item.field, `${item.message}; allowed ${item.allowed}`)) this.rows.get(item.field).box.parentNode.open = true;
+      }
+      const wrong = (answer.body.details || []).length;
+      this.say(wrong ? `Nothing was changed: ${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields.` : sentence(answer.body), true);
       if (answer.status === 412) this.values = (await send("GET", "/api/tuning")).body.values || this.values;
       if (answer.status === 412 && answer.body.version) this.version = answer.body.version;
       this.refresh();
