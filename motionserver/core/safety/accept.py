@@ -10,6 +10,7 @@ from motionserver.core.motion.moves import rest_to_rest, straight_way
 from motionserver.core.plan import Plan, rest_at
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.core.safety.verify import (
+    AHEAD,
     CLOSEST,
     GUARD_MARGINS,
     LONGEST_MOVE,
@@ -43,6 +44,10 @@ def accept_proposal(
         if not np.isfinite(plan.takeover):
             return Rejection(Reason.NOT_FINITE)
         return Rejection(Reason.TOO_LATE, None, None, plan.takeover, earliest)
+    if plan.takeover - clock > AHEAD:
+        if not np.isfinite(plan.takeover):
+            return Rejection(Reason.NOT_FINITE)
+        return Rejection(Reason.TOO_EARLY, None, None, plan.takeover, clock + AHEAD)
     rejection = judge(machine, plan, parent.plan, parent.before, GUARD_MARGINS, homes)
     if rejection is not None:
         return rejection

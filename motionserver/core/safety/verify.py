@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import (
@@ -16,21 +18,25 @@ from motionserver.core.kinematics.hexapod import (
 )
 from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import straight_way
-from motionserver.core.plan import MAX_DURATION, MAX_KNOTS, Plan
+from motionserver.core.plan import FIRST_STEP, KNOT_STEP, MAX_DURATION, MAX_KNOTS, Plan
 from motionserver.core.safety.verdict import Reason, Rejection
 
 GRID: Final = 0.002
 """Spacing of the samples that are checked [s]."""
 CLOSEST: Final = 0.003
 """Least time between two hand-overs [s]: the samples before a hand-over lie on one parent."""
+AHEAD: Final = 0.5
+"""Longest wait of an accepted plan for its instant [s]: nothing may hold off a stop for longer."""
 LONGEST_MOVE: Final = 60.0
 """Longest rest-to-rest move [s]."""
 
 _POSE_TOLERANCE: Final = 1e-7
 _VELOCITY_TOLERANCE: Final = 1e-6
 _ACCELERATION_TOLERANCE: Final = 1e-4
-_COARSE: Final = 10
-_SPARSE: Final = 100
+_SWING_EVERY: Final = 10
+_CONDITIONING_EVERY: Final = 25
+_WAY_EVERY: Final = 4
+_ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +47,21 @@ class Margins:
         stroke: Kept from both ends of the stroke [m]; a h^2/8 is 4 um of it.
         share: Share of leg speed and acceleration that may be used [-].
         jerk_share: Share of leg jerk that may be used [-]; jerk changes fastest between samples.
+        swing: Kept from the largest joint angle [rad].
+        conditioning: Least conditioning as a multiple of the machine's [-].
     """
 
     stroke: float = 0.0002
     share: float = 0.995
     jerk_share: float = 0.97
+    swing: float = 0.001
+    conditioning: float = 1.01
 
 
 GUARD_MARGINS: Final = Margins()
-PLANNER_MARGINS: Final = Margins(stroke=0.0005, share=0.98, jerk_share=0.94)
+PLANNER_MARGINS: Final = Margins(
+    stroke=0.0005, share=0.98, jerk_share=0.94, swing=0.003, conditioning=1.03
+)
 """Tighter, so that what remains of an accepted plan passes again on a shifted grid."""
 
 
@@ -97,10 +109,19 @@ def well_formed(plan: Plan, longest: float) -> Rejection | None:
         np.isfinite(plan.takeover) and all(np.isfinite(t).all() for t in (plan.times, *tables))
     ):
         return Rejection(Reason.NOT_FINITE)
-    if plan.times[0] != 0.0 or np.min(np.diff(plan.times)) < 1e-4:
-        return Rejection(Reason.MALFORMED, when=float(plan.times[0]))
-    if plan.duration > longest:
-        return Rejection(Reason.MALFORMED, value=plan.duration, allowed=longest)
+    if plan.times[0] != 0.0 or np.min(plan.times) < 0.0:
+        return Rejection(Reason.MALFORMED, when=float(np.min(plan.times)))
+    last = float(np.max(plan.times))
+    if last > longest:
+        return Rejection(Reason.MALFORMED, value=last, allowed=longest)
+    # knots between two samples of the grid could hide any motion there
+    steps = np.diff(plan.times)
+    least = np.where(np.arange(count - 1) == 0, FIRST_STEP, KNOT_STEP) - _ROUNDING
+    if (steps < least).any():
+        knot = int(np.argmax(steps < least))
+        return Rejection(
+            Reason.MALFORMED, float(plan.times[knot]), None, float(steps[knot]), float(least[knot])
+        )
     # wild numbers could overflow in the kinematics; no platform of ours is a hundred metres wide
     if max(float(np.max(np.abs(t))) for t in tables) > 1e4:
         return Rejection(Reason.NOT_FINITE, value=1e4)
@@ -139,10 +160,10 @@ def check_legs(
         return max(0.0, (row + behind - skipped) * step)
 
     low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
-    for value, allowed, outside in ((legs.min(), low, legs < low), (legs.max(), high, legs > high)):
+    for allowed, outside in ((low, legs < low), (high, legs > high)):
         if outside.any():
-            row, leg = np.argwhere(outside)[0]
-            return Rejection(Reason.LEG_LENGTH, at(row, 0), int(leg), float(value), allowed)
+            row, leg = (int(index) for index in np.argwhere(outside)[0])
+            return Rejection(Reason.LEG_LENGTH, at(row, 0), leg, float(legs[row, leg]), allowed)
     moved = legs
     for order, reason, limit, share in (
         (1, Reason.LEG_SPEED, machine.leg_speed, margins.share),
@@ -157,34 +178,43 @@ def check_legs(
         if largest > limit * share:
             row, leg = np.unravel_index(int(size.argmax()), size.shape)
             return Rejection(reason, at(int(row), order), int(leg), largest, limit * share)
-    return _check_coarse(machine, poses, step, skipped)
-
-
-def _check_coarse(machine: Machine, poses: Array, step: float, skipped: int) -> Rejection | None:
-    if machine.joint_angle is not None:
-        swing = joint_angles(machine, poses[::_COARSE])
-        if swing.max() > machine.joint_angle:
-            row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
-            when = max(0.0, (int(row) * _COARSE - skipped) * step)
-            return Rejection(
-                Reason.JOINT_ANGLE, when, int(leg), float(swing.max()), machine.joint_angle
-            )
-    if machine.conditioning is not None:
-        sparse = np.concatenate((poses[::_SPARSE], poses[-1:]))
-        least = machine.conditioning * neutral_conditioning(machine)
-        values = conditioning(machine, sparse)
-        if values.min() < least:
-            when = max(0.0, (int(values.argmin()) * _SPARSE - skipped) * step)
-            return Rejection(Reason.CONDITIONING, when, None, float(values.min()), least)
     if machine.passenger_acceleration is not None:
         second = np.diff(poses[:, :3], 2, axis=0) / step**2
         size = np.linalg.norm(second, axis=1)
-        if size.max() > machine.passenger_acceleration:
-            when = max(0.0, (int(size.argmax()) + 2 - skipped) * step)
-            return Rejection(
-                Reason.PASSENGER, when, None, float(size.max()), machine.passenger_acceleration
-            )
+        largest, allowed = float(size.max()), machine.passenger_acceleration * margins.share
+        if largest > allowed:
+            return Rejection(Reason.PASSENGER, at(int(size.argmax()), 2), None, largest, allowed)
+    return _check_posture(machine, poses, margins, (_SWING_EVERY, _CONDITIONING_EVERY), at)
+
+
+def _check_posture(
+    machine: Machine,
+    poses: Array,
+    margins: Margins,
+    every: tuple[int, int],
+    at: Callable[[int, int], float | None],
+) -> Rejection | None:
+    """Joint angles and conditioning at some of the poses (N, 6), the last one included."""
+    if machine.joint_angle is not None:
+        rows = _thinned(len(poses), every[0])
+        swing = joint_angles(machine, poses[rows])
+        largest, allowed = float(swing.max()), machine.joint_angle - margins.swing
+        if largest > allowed:
+            row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
+            when = at(int(rows[row]), 0)
+            return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
+    if machine.conditioning is not None:
+        rows = _thinned(len(poses), every[1])
+        found = conditioning(machine, poses[rows])
+        allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
+        if found.min() < allowed:
+            when = at(int(rows[found.argmin()]), 0)
+            return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None
+
+
+def _thinned(count: int, every: int) -> NDArray[np.intp]:
+    return np.append(np.arange(0, count, every), count - 1)
 
 
 def _played_before(plan: Plan, parent: Plan, before: Plan | None, step: float) -> Array:
@@ -203,12 +233,14 @@ def check_ways_home(
     """From the rest pose (6,) a straight, allowed way to each of the poses ``homes`` (H, 6)."""
     for home in homes:
         way = straight_way(machine, rest, home)
-        short, long = float(way.legs.min()), float(way.legs.max())
-        if short < machine.leg_min + margins.stroke or long > machine.leg_max - margins.stroke:
-            beyond = max(machine.leg_min + margins.stroke - short, long - machine.leg_max)
+        low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
+        beyond = max(low - float(way.legs.min()), float(way.legs.max()) - high)
+        if beyond > 0.0:
             return Rejection(Reason.NO_WAY_HOME, None, None, beyond, 0.0)
-        if _check_coarse(machine, way.poses[::4], GRID, 0) is not None:
-            return Rejection(Reason.NO_WAY_HOME)
+        every = (_WAY_EVERY, _WAY_EVERY)
+        posture = _check_posture(machine, way.poses, margins, every, lambda row, behind: None)
+        if posture is not None:
+            return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
         if way.duration > LONGEST_MOVE:
             return Rejection(Reason.NO_WAY_HOME, None, None, way.duration, LONGEST_MOVE)
     return None
