@@ -72,6 +72,7 @@ class Bench:
         self.source = True
         self.planning = True
         self.plan = self._remainder
+        self.plan_every = 3
         self.sent = []
         self.seen = []
         self._cue_ns = 0
@@ -104,7 +105,7 @@ class Bench:
         self._answer = None
         playback = self.record.playback
         proposal = None
-        if self.planning and self.ticks % 3 == 0 and playback is not None:
+        if self.planning and self.ticks % self.plan_every == 0 and playback is not None:
             proposal = self.plan(playback)
         setpoint, answers = self.guard.tick(
             TickInput(

@@ -8,6 +8,7 @@ from motionserver.core.axes import Array
 from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import rest_to_rest, straight_way
 from motionserver.core.plan import Plan, rest_at
+from motionserver.core.safety.shape import well_formed
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.core.safety.verify import (
     AHEAD,
@@ -18,7 +19,6 @@ from motionserver.core.safety.verify import (
     check_legs,
     check_ways_home,
     judge,
-    well_formed,
 )
 
 

@@ -18,7 +18,8 @@ from motionserver.core.kinematics.hexapod import (
 )
 from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import straight_way
-from motionserver.core.plan import FIRST_STEP, KNOT_STEP, MAX_DURATION, MAX_KNOTS, Plan
+from motionserver.core.plan import MAX_DURATION, Plan
+from motionserver.core.safety.shape import continues, well_formed
 from motionserver.core.safety.verdict import Reason, Rejection
 
 GRID: Final = 0.002
@@ -30,13 +31,10 @@ AHEAD: Final = 0.5
 LONGEST_MOVE: Final = 60.0
 """Longest rest-to-rest move [s]."""
 
-_POSE_TOLERANCE: Final = 1e-7
-_VELOCITY_TOLERANCE: Final = 1e-6
-_ACCELERATION_TOLERANCE: Final = 1e-4
+_DOUBTFUL: Final = 0.65
 _SWING_EVERY: Final = 10
 _CONDITIONING_EVERY: Final = 25
 _WAY_EVERY: Final = 4
-_ROUNDING: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,58 +88,10 @@ def judge(
     goals = machine.parked_pose[None] if homes is None else homes
     return (
         well_formed(plan, MAX_DURATION)
-        or _continues(plan, parent)
+        or continues(plan, parent)
         or check_legs(machine, plan, parent, before, margins)
         or check_ways_home(machine, plan.rest_pose, goals, margins)
     )
-
-
-def well_formed(plan: Plan, longest: float) -> Rejection | None:
-    """Shape, order of knots, finiteness, and rest at the end."""
-    count = len(plan.times)
-    shape = (count, 6)
-    tables = (plan.pose, plan.velocity, plan.acceleration)
-    if not 2 <= count <= MAX_KNOTS:
-        return Rejection(Reason.MALFORMED, value=count, allowed=MAX_KNOTS)
-    if plan.times.shape != (count,) or any(table.shape != shape for table in tables):
-        return Rejection(Reason.MALFORMED)
-    if not (
-        np.isfinite(plan.takeover) and all(np.isfinite(t).all() for t in (plan.times, *tables))
-    ):
-        return Rejection(Reason.NOT_FINITE)
-    if plan.times[0] != 0.0 or np.min(plan.times) < 0.0:
-        return Rejection(Reason.MALFORMED, when=float(np.min(plan.times)))
-    last = float(np.max(plan.times))
-    if last > longest:
-        return Rejection(Reason.MALFORMED, value=last, allowed=longest)
-    # knots between two samples of the grid could hide any motion there
-    steps = np.diff(plan.times)
-    least = np.where(np.arange(count - 1) == 0, FIRST_STEP, KNOT_STEP) - _ROUNDING
-    if (steps < least).any():
-        knot = int(np.argmax(steps < least))
-        return Rejection(
-            Reason.MALFORMED, float(plan.times[knot]), None, float(steps[knot]), float(least[knot])
-        )
-    # wild numbers could overflow in the kinematics; no platform of ours is a hundred metres wide
-    if max(float(np.max(np.abs(t))) for t in tables) > 1e4:
-        return Rejection(Reason.NOT_FINITE, value=1e4)
-    speed = float(max(np.max(np.abs(plan.velocity[-1])), np.max(np.abs(plan.acceleration[-1]))))
-    if speed > 1e-9:
-        return Rejection(Reason.NOT_AT_REST, when=plan.duration, value=speed, allowed=0.0)
-    return None
-
-
-def _continues(plan: Plan, parent: Plan) -> Rejection | None:
-    there = parent.state(plan.takeover)
-    for found, wanted, tolerance in (
-        (plan.pose[0], there.pose, _POSE_TOLERANCE),
-        (plan.velocity[0], there.velocity, _VELOCITY_TOLERANCE),
-        (plan.acceleration[0], there.acceleration, _ACCELERATION_TOLERANCE),
-    ):
-        gap = float(np.max(np.abs(found - wanted)))
-        if gap > tolerance:
-            return Rejection(Reason.DISCONTINUOUS, when=0.0, value=gap, allowed=tolerance)
-    return None
 
 
 def check_legs(
@@ -150,20 +100,18 @@ def check_legs(
     """Leg length, speed, acceleration, jerk on the grid; joints and the rest coarser."""
     # a long move is smooth: two thousand samples show it whole
     step = max(GRID, plan.duration / 2000.0)
-    times: Array = np.arange(int(np.ceil(plan.duration / step)) + 4, dtype=np.float64) * step
-    lead = _played_before(plan, parent, before, step)
-    poses = np.concatenate((lead, plan.poses(times)))
-    skipped = len(lead)
+    poses, skipped = _samples(plan, parent, before, step)
     legs = leg_lengths(machine, poses)
 
-    def at(row: int, behind: int) -> float:
-        return max(0.0, (row + behind - skipped) * step)
+    def at(row: int) -> float:
+        return max(0.0, (row - skipped) * step)
 
     low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
     for allowed, outside in ((low, legs < low), (high, legs > high)):
         if outside.any():
-            row, leg = (int(index) for index in np.argwhere(outside)[0])
-            return Rejection(Reason.LEG_LENGTH, at(row, 0), leg, float(legs[row, leg]), allowed)
+            first, short = (int(index) for index in np.argwhere(outside)[0])
+            found = float(legs[first, short])
+            return Rejection(Reason.LEG_LENGTH, at(first), short, found, allowed)
     moved = legs
     for order, reason, limit, share in (
         (1, Reason.LEG_SPEED, machine.leg_speed, margins.share),
@@ -173,17 +121,21 @@ def check_legs(
         moved = np.diff(moved, axis=0) / step
         if limit is None:
             continue
-        size = np.abs(moved)
+        size, spacing = np.abs(moved), step
+        if order == 3 and limit * _DOUBTFUL < size.max() <= limit * share:
+            # jerk changes between samples: seen from other instants it can be a third larger
+            size, spacing = _fine_jerk(machine, plan, parent, before, step / 2.0), step / 2.0
         largest = float(size.max())
         if largest > limit * share:
             row, leg = np.unravel_index(int(size.argmax()), size.shape)
-            return Rejection(reason, at(int(row), order), int(leg), largest, limit * share)
+            when = max(0.0, (int(row) + order - skipped) * spacing)
+            return Rejection(reason, when, int(leg), largest, limit * share)
     if machine.passenger_acceleration is not None:
         second = np.diff(poses[:, :3], 2, axis=0) / step**2
         size = np.linalg.norm(second, axis=1)
         largest, allowed = float(size.max()), machine.passenger_acceleration * margins.share
         if largest > allowed:
-            return Rejection(Reason.PASSENGER, at(int(size.argmax()), 2), None, largest, allowed)
+            return Rejection(Reason.PASSENGER, at(int(size.argmax()) + 2), None, largest, allowed)
     return _check_posture(machine, poses, margins, (_SWING_EVERY, _CONDITIONING_EVERY), at)
 
 
@@ -192,7 +144,7 @@ def _check_posture(
     poses: Array,
     margins: Margins,
     every: tuple[int, int],
-    at: Callable[[int, int], float | None],
+    at: Callable[[int], float | None],
 ) -> Rejection | None:
     """Joint angles and conditioning at some of the poses (N, 6), the last one included."""
     if machine.joint_angle is not None:
@@ -201,20 +153,34 @@ def _check_posture(
         largest, allowed = float(swing.max()), machine.joint_angle - margins.swing
         if largest > allowed:
             row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
-            when = at(int(rows[row]), 0)
+            when = at(int(rows[row]))
             return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
     if machine.conditioning is not None:
         rows = _thinned(len(poses), every[1])
         found = conditioning(machine, poses[rows])
         allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
         if found.min() < allowed:
-            when = at(int(rows[found.argmin()]), 0)
+            when = at(int(rows[found.argmin()]))
             return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None
 
 
 def _thinned(count: int, every: int) -> NDArray[np.intp]:
     return np.append(np.arange(0, count, every), count - 1)
+
+
+def _fine_jerk(
+    machine: Machine, plan: Plan, parent: Plan, before: Plan | None, step: float
+) -> Array:
+    poses, _ = _samples(plan, parent, before, step)
+    return np.abs(np.diff(leg_lengths(machine, poses), 3, axis=0)) / step**3
+
+
+def _samples(plan: Plan, parent: Plan, before: Plan | None, step: float) -> tuple[Array, int]:
+    """Poses on the grid, to three samples after the end; and how many of them lie before it."""
+    times: Array = np.arange(int(np.ceil(plan.duration / step)) + 4, dtype=np.float64) * step
+    lead = _played_before(plan, parent, before, step)
+    return np.concatenate((lead, plan.poses(times))), len(lead)
 
 
 def _played_before(plan: Plan, parent: Plan, before: Plan | None, step: float) -> Array:
@@ -238,7 +204,7 @@ def check_ways_home(
         if beyond > 0.0:
             return Rejection(Reason.NO_WAY_HOME, None, None, beyond, 0.0)
         every = (_WAY_EVERY, _WAY_EVERY)
-        posture = _check_posture(machine, way.poses, margins, every, lambda row, behind: None)
+        posture = _check_posture(machine, way.poses, margins, every, lambda row: None)
         if posture is not None:
             return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
         if way.duration > LONGEST_MOVE:
