@@ -36,6 +36,7 @@ class ServerSection(Strict):
     run_dir: str = ""
     state_dir: str = ""
     log_level: Literal["debug", "info", "warning"] = "info"
+    realtime: bool = True
 
 
 class PlatformSection(Strict):
@@ -71,6 +72,7 @@ class SourceSection(Strict):
     key_file: str = ""
     topic: str = "motion/0/in/cue"
     connect: list[str] = Field(default_factory=list)
+    allow_unsigned: bool = False
 
     @field_validator("listen")
     @classmethod

@@ -34,7 +34,11 @@ class Guard:
         self.homes = frozen(np.stack((NEUTRAL, config.machine.parked_pose)))
         self.record = GuardRecord()
         self.supervisor = Supervisor(
-            config.machine, config.patience, config.send_period, config.plan_period
+            config.machine,
+            config.patience,
+            config.send_period,
+            config.plan_period,
+            config.dry_run,
         )
         self._last = Setpoint(
             Order.WAIT, PlatformState.at_rest(NEUTRAL), leg_lengths(self.machine, NEUTRAL)
@@ -77,7 +81,7 @@ class Guard:
                 refusal = self._reset(now)
             elif request.op != "engage":
                 refusal = f"unknown request {request.op!r}; allowed: engage, park, reset"
-            elif self.config.engage != request.by:
+            elif request.by not in ("console", self.config.engage):
                 refusal = (
                     f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
                 )
@@ -196,8 +200,9 @@ class Guard:
             self.supervisor.inconsistent = "an accepted plan led outside the stroke"
             record.playback = None
             return self._last
-        setpoint = Setpoint(order, state, frozen(legs[0]))
-        if order is Order.FOLLOW:
+        sent = Order.WAIT if self.config.dry_run else order
+        setpoint = Setpoint(sent, state, frozen(legs[0]))
+        if sent is Order.FOLLOW:
             self.supervisor.astray = self.supervisor.device.track(now_ns, legs[0], speeds[0])
         self._last = setpoint
         record.counters["setpoints"] += 1

@@ -17,9 +17,15 @@ class Supervisor:
     """Derives what happened in this tick and looks up what follows."""
 
     def __init__(
-        self, machine: Machine, patience: Patience, send_period: float, plan_period: float
+        self,
+        machine: Machine,
+        patience: Patience,
+        send_period: float,
+        plan_period: float,
+        dry_run: bool = False,
     ) -> None:
         self.patience = patience
+        self.dry_run = dry_run
         self.device = DeviceWatch(machine, patience, send_period)
         self.source = SourceWatch()
         self._no_plan_ns = int(patience.plans * plan_period * SECOND)
@@ -96,6 +102,7 @@ class Supervisor:
             yield Event.DEVICE_DOWN
         if up:
             yield Event.DEVICE_UP
+        if up or self.dry_run:
             yield Event.RAISED
 
     def _from_source(self, record: GuardRecord, now_ns: int) -> Iterator[Event]:
