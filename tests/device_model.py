@@ -1,6 +1,7 @@
 """A perfect device and a guard on virtual time, for tests: pure, no sockets, no sleeping."""
 
 import numpy as np
+from own_kinematics import lengths
 
 from motionserver.core.device import Feedback, Order, Phase
 from motionserver.core.safety.act import Guard
@@ -8,7 +9,6 @@ from motionserver.core.safety.given import GuardConfig, Request, TickInput
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
 from motionserver.cueing.governor import remainder
-from own_kinematics import lengths
 
 TICK_NS = 4_166_667
 SEND_EVERY = 4

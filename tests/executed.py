@@ -1,9 +1,9 @@
 """What a guard really played, rebuilt from the accepted plans and judged by other kinematics."""
 
 import numpy as np
+from own_kinematics import lengths, quintic_poses, worst
 
 from motionserver.core.device import Order
-from own_kinematics import lengths, quintic_poses, worst
 
 PERIOD = 1 / 60
 FINE = 1 / 500

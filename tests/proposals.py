@@ -35,7 +35,7 @@ MIX = {
     "malformed": 0.08,
     "wrong parent": 0.08,
     "late": 0.08,
-    "early": 0.04,
+    "early": 0.03,
 }
 _KINDS = tuple(MIX)
 

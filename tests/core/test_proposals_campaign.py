@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from device_model import Bench
 from executed import Executed
 from machines import compact

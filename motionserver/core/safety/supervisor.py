@@ -87,7 +87,7 @@ class Supervisor:
         if newest.faults or newest.phase in (Phase.FAULTED, Phase.DISABLED):
             yield Event.DEVICE_FAULT
             return
-        if record.state in CUED and newest.phase is not Phase.UP:
+        if record.state in CUED and newest.phase is not Phase.UP and not self.dry_run:
             yield Event.DEVICE_FAULT
             return
         if newest.estop or self.device.valid_for(now_ns) < self.patience.valid:
