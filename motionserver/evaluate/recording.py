@@ -11,12 +11,13 @@ import numpy as np
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.kinematics.rotation import gravity_in_body
+from motionserver.errors import MotionServerError
 
 COLUMNS: Final = ("t", "ax", "ay", "az", "p", "q", "r", "v", "roll", "pitch")
 """Columns a recording must have, in any order; further ones are ignored."""
 
 
-class RecordingError(ValueError):
+class RecordingError(MotionServerError):
     """A recording cannot be read; tells file, line (from 1) and column.
 
     Attributes:
