@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -123,14 +124,16 @@ def _panel(panel: Panel) -> str:
             f'<path class="grid{zero}" d="M{_LEFT} {y(value):.1f}H{right}"/>'
             f'<text x="{_LEFT - 6}" y="{y(value) + 4:.1f}" text-anchor="end">{value:.6g}</text>'
         )
-    for time in _ticks(begin, end, 10):
-        out.append(
-            f'<text x="{x(time):.1f}" y="{bottom + 16}" text-anchor="middle">{time:g}'
-            f"{' s' if time >= end - 1e-9 else ''}</text>"
-        )
-    for level in panel.limits:
-        if low <= level <= high:
-            out.append(f'<path class="limit" d="M{_LEFT} {y(level):.1f}H{right}"/>')
+    out += [
+        f'<text x="{x(time):.1f}" y="{bottom + 16}" text-anchor="middle">{time:g}'
+        f"{' s' if time >= end - 1e-9 else ''}</text>"
+        for time in _ticks(begin, end, 10)
+    ]
+    out += [
+        f'<path class="limit" d="M{_LEFT} {y(level):.1f}H{right}"/>'
+        for level in panel.limits
+        if low <= level <= high
+    ]
     for curve in panel.curves:
         points = _thin(panel.times, np.clip(curve.values, low - 1.0, high + 1.0))
         path = "L".join(f"{x(t):.1f} {min(max(y(v), 0), panel.height):.1f}" for t, v in points)
@@ -174,7 +177,7 @@ def _thin(times: Array, values: Array) -> list[tuple[float, float]]:
         return list(zip(times.tolist(), values.tolist(), strict=True))
     edges = np.linspace(0, count, _MOST_POINTS // 2 + 1).astype(int)
     kept: list[int] = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         piece = values[a:b]
         kept += sorted({int(a + np.argmin(piece)), int(a + np.argmax(piece))})
     return [(float(times[i]), float(values[i])) for i in kept]

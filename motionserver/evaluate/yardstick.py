@@ -73,14 +73,9 @@ def find_yardstick(
     tried: dict[float, float] = {}
     best: Drive | None = None
     best_gain = 0.0
-    rounds = [COARSE, *STEPS]
-    for asked in rounds:
-        gains = (
-            asked
-            if isinstance(asked, tuple)
-            else tuple(round(best_gain + sign * asked, 6) for sign in (-1, 1))
-        )
-        gains = tuple(g for g in gains if 0.0 < g <= 1.0 and g not in tried)
+    for step in (0.0, *STEPS):
+        asked = COARSE if step == 0.0 else (best_gain - step, best_gain + step)
+        gains = tuple(g for g in (round(a, 6) for a in asked) if 0.0 < g <= 1.0 and g not in tried)
         for gain, driven in zip(gains, _all(run, gains, jobs), strict=True):
             tried[gain] = rmse_xy(driven)
             # a tie goes to the smaller gain, whatever the order of trial
