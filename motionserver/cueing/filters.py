@@ -113,9 +113,7 @@ def low_pass(corner: Corner) -> Block:
 
     phi/U = omega2/g / ((s2 + 2 zeta omega s + omega2)(tau s + 1)).
     """
-    return Block(
-        _companion(corner), frozen([0.0, 0.0, corner.omega**2 / (GRAVITY * corner.tau)])
-    )
+    return Block(_companion(corner), frozen([0.0, 0.0, corner.omega**2 / (GRAVITY * corner.tau)]))
 
 
 def rate_high_pass(omega: float, tau: float) -> Block:

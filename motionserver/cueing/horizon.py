@@ -61,9 +61,7 @@ def make_grid(horizon: float, period: float, finest: float = 0.03, node: float =
                 pieces.append(piece)
     instants = np.array(knots)
     share = np.diff(np.concatenate(([0.0], instants[nodes])))
-    return Grid(
-        frozen(edges), frozen(instants), np.array(nodes), np.array(pieces), frozen(share)
-    )
+    return Grid(frozen(edges), frozen(instants), np.array(nodes), np.array(pieces), frozen(share))
 
 
 def _lengths(horizon: float, period: float) -> Array:

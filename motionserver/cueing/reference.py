@@ -99,7 +99,8 @@ class Reference:
             ahead = np.concatenate((newest[:1], self._forecasts[axis] @ newest))
             out[:, axis] = np.interp(self._instants, self._steps, ahead)
         rest = (now - self._stages[1]) * self._rest_decay
-        return np.clip(out, -LARGEST, LARGEST) + rest
+        forecast: Array = np.clip(out, -LARGEST, LARGEST) + rest
+        return forecast
 
     def _with_preview(self, model: Array, now: Array, preview: Preview) -> Array:
         """Follow the preview while it lasts, then let its last error against the model decay."""

@@ -15,7 +15,7 @@ from motionserver.core.axes import Array, frozen
 from motionserver.core.plan import Plan
 from motionserver.core.state import PlatformState
 from motionserver.cueing.filters import FilterSet, rate_high_pass
-from motionserver.cueing.horizon import Condensed, Grid, condense
+from motionserver.cueing.horizon import Grid, condense
 from motionserver.cueing.stopping import with_stop
 
 REMEMBERED: Final = 16
@@ -39,9 +39,8 @@ class RotationPart:
     def rebuild(self, filters: FilterSet, grid: Grid) -> None:
         """Take other corners or another grid; what is remembered stays valid."""
         self._grid = grid
-        maps: list[Condensed] = []
-        for corner in (filters.rotation, filters.rotation, filters.yaw.omega):
-            maps.append(condense(rate_high_pass(corner, filters.rotation_tau), grid))
+        corners = (filters.rotation, filters.rotation, filters.yaw.omega)
+        maps = [condense(rate_high_pass(corner, filters.rotation_tau), grid) for corner in corners]
         self._phi: Array = np.stack([each.phi for each in maps])
         self._gamma: Array = np.stack([each.gamma for each in maps])
 
@@ -74,7 +73,8 @@ class RotationPart:
         tables[:, 1:, _ANGLES] = states[..., 0].T
         times = np.concatenate(([0.0], self._grid.knots))
         out = with_stop(times, tables[0], tables[1], tables[2], stop)
-        self._candidate = Plan(0, parent.plan_id, takeover, *(frozen(table) for table in out))
+        times, pose, velocity, acceleration = (frozen(table) for table in out)
+        self._candidate = Plan(0, parent.plan_id, takeover, times, pose, velocity, acceleration)
         return out
 
     def adopt(self, plan: Plan, kappa: float) -> None:
@@ -90,9 +90,11 @@ class RotationPart:
         after = before
         if new is not None:
             after = new.evaluate(plan.times)
-        blended = [frozen(a + kappa * (b - a)) for a, b in zip(before, after, strict=True)]
+        pose, velocity, acceleration = (
+            frozen(a + kappa * (b - a)) for a, b in zip(before, after, strict=True)
+        )
         self._parts[plan.plan_id] = Plan(
-            plan.plan_id, plan.parent_id, plan.takeover, plan.times, *blended
+            plan.plan_id, plan.parent_id, plan.takeover, plan.times, pose, velocity, acceleration
         )
         while len(self._parts) > REMEMBERED:
             self._parts.popitem(last=False)

@@ -7,7 +7,7 @@ box (Table 2), the threshold of tilt rate (Table 1, soft) and, beyond the paper,
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -17,27 +17,35 @@ from motionserver.core.limits import Machine
 from motionserver.core.plan import Plan
 from motionserver.core.state import PlatformState, Stimulus
 from motionserver.cueing.base import Candidate, Report
-from motionserver.cueing.channels import minus
+from motionserver.cueing.channels import CHANNELS, minus
 from motionserver.cueing.filters import filter_set
-from motionserver.cueing.halving import make_halving
+from motionserver.cueing.halving import Halving, make_halving
 from motionserver.cueing.horizon import make_grid
 from motionserver.cueing.reference import Reference
 from motionserver.cueing.rotation import RotationPart
 from motionserver.cueing.stopping import STOP_TIME, with_stop
-from motionserver.cueing.thondel_cost import make_cost
-from motionserver.cueing.thondel_legs import leg_rows, margins_over
 from motionserver.cueing.thondel_plant import make_plant, stacked_state
-from motionserver.cueing.thondel_rows import LARGEST_INPUT, LEG_UNIT, make_rows
+from motionserver.cueing.thondel_qp import Programme
+from motionserver.cueing.thondel_rows import LEG_UNIT
 from motionserver.cueing.tuning import Tuning
-from motionserver.solvers.base import QpMatrices, QpStatus, QpVectors
-from motionserver.solvers.registry import make_backend
+from motionserver.solvers.base import QpResult, QpStatus
 
 YAW_CORNER: Final = 0.5
 """High-pass of the wanted yaw rate [rad/s]."""
 LARGEST_DISTURBANCE: Final = 0.3
 """Bound of the estimated output disturbance [m/s2]."""
-SIGNALS: Final = (0, 1, 2, 5)
-"""Reference signal of each channel: f_x, f_y, f_z, r."""
+SLACK_NOTICED: Final = 1e-4
+"""Leg slack that counts as trouble [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Pending:
+    """What `adopt` needs of the last candidate."""
+
+    poses: Array
+    inputs: Array
+    start: PlatformState
+    leg_slack: float
 
 
 class Thondel:
@@ -49,208 +57,167 @@ class Thondel:
         period: Planner period; the hand-over is one period ahead [s].
 
     Attributes:
-        disturbance: Estimated specific force nobody planned, (3,) [m/s2]; set from outside.
+        disturbance: Specific force nobody planned, as estimated outside, (3,) [m/s2].
+
+    Raises:
+        ValueError: The tuning names a filter set, model, backend or halving that does not exist.
     """
 
     name = "thondel2014"
 
+    _halving: Halving
+
     def __init__(self, machine: Machine, tuning: Tuning, period: float) -> None:
         self._machine, self._period = machine, period
         self.disturbance: Array = np.zeros(3)
-        self._last = np.zeros(4)
+        self._last = np.zeros(len(CHANNELS))
         self._slow_yaw = 0.0
-        self._trouble = False
-        self._pending: tuple[Array, Array, PlatformState, float] | None = None
+        self._yaw_share = 1.0 - float(np.exp(-YAW_CORNER * period))
+        self._pending: _Pending | None = None
+        self._tuning = tuning
+        filters = filter_set(tuning.filters)
+        self._grid = make_grid(tuning.horizon, period)
+        self._rotation = RotationPart(filters, self._grid)
+        self._halving = make_halving(tuning.halving, machine, tuning.box, period)
         self._build(tuning)
         self._report = Report(frozen(self._halving.x_max))
 
     def retune(self, tuning: Tuning) -> None:
-        """Take other tunables; cheap unless filters, horizon, reference or backend change."""
+        """Take other tunables; cheap unless filters, horizon, reference or backend change.
+
+        Motion stays continuous whatever changes: the next plan begins on the accepted one.
+
+        Raises:
+            ValueError: As in the constructor; nothing has changed then.
+        """
         old = self._tuning
         if (old.filters, old.horizon) != (tuning.filters, tuning.horizon):
+            filters = filter_set(tuning.filters)
+            self._grid = make_grid(tuning.horizon, self._period)
+            self._rotation.rebuild(filters, self._grid)
             self._build(tuning)
-            return
-        if old.reference != tuning.reference:
-            self._reference = self._make_reference(tuning)
+        else:
+            self._programme.weigh(tuning)
+            if old.reference != tuning.reference:
+                self._reference = self._make_reference(tuning)
         if old.halving != tuning.halving:
-            self._halving = self._make_halving(tuning)
-        self._weigh(tuning)
+            x_max = np.minimum(self._halving.x_max, tuning.box)
+            self._halving = make_halving(tuning.halving, self._machine, tuning.box, self._period)
+            self._halving.x_max = x_max if tuning.halving != "off" else self._halving.x_max
+        self._tuning = tuning
 
     def _build(self, tuning: Tuning) -> None:
-        filters = filter_set(tuning.filters)
-        grid = make_grid(tuning.horizon, self._period)
-        self._grid = grid
-        self._plant = make_plant(filters, grid, self._machine.head)
-        self._rotation = RotationPart(filters, grid)
+        """Everything that depends on the grid or the filters."""
+        grid = self._grid
+        self._plant = make_plant(filter_set(tuning.filters), grid, self._machine.head)
+        self._programme = Programme(self._machine, self._plant, tuning)
         self._reference = self._make_reference(tuning)
-        self._halving = self._make_halving(tuning)
-        pieces = len(grid.edges) - 1
-        belongs = (grid.node_piece == np.arange(pieces)[:, None]) * grid.node_share
+        belongs = (grid.node_piece == np.arange(self._plant.moves)[:, None]) * grid.node_share
         self._to_pieces: Array = belongs / belongs.sum(axis=1, keepdims=True)
-        instants = grid.knots[grid.nodes]
-        self._looks = np.append(instants, instants[-1] + STOP_TIME)
-        self._margins = margins_over(self._looks)
-        self._weigh(tuning)
 
     def _make_reference(self, tuning: Tuning) -> Reference:
         instants = self._grid.knots[self._grid.nodes]
         return Reference(tuning.reference, self._period, instants, self._period)
 
-    def _make_halving(self, tuning: Tuning):
-        return make_halving(tuning.halving, self._machine, tuning.box, self._period)
-
-    def _weigh(self, tuning: Tuning) -> None:
-        self._tuning = tuning
-        self._cost = make_cost(self._plant, tuning)
-        self._rows = make_rows(self._plant, tuning)
-        layout = self._rows.layout
-        hessian = np.diag(self._rows.curvature)
-        hessian[: layout.inputs, : layout.inputs] += self._cost.H
-        self._hessian = frozen(hessian)
-        slack = np.tile(np.arange(6) + layout.box.start, len(self._looks))
-        table = np.zeros((len(slack), layout.size))
-        table[:, : layout.inputs] = self._rows.box
-        self._box_slack = slack
-        self._box_table = table
-        self._box_lower = np.concatenate(
-            (np.full(layout.inputs, -LARGEST_INPUT), np.zeros(layout.size - layout.inputs))
-        )
-        self._box_upper = np.concatenate(
-            (np.full(layout.inputs, LARGEST_INPUT), np.full(layout.size - layout.inputs, np.inf))
-        )
-        self._backend = make_backend(tuning.backend)
-        self._fresh = True
-
     def propose(
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus
     ) -> Candidate | None:
         """Solve for the inputs and lay out the filters' answer; see `Cueing.propose`."""
+        self._pending = None
+        if not (np.isfinite(stimulus.force).all() and np.isfinite(stimulus.rates).all()):
+            return self._no_candidate("not finite", 0)
         wanted = self._reference.predict(stimulus)
-        if not np.isfinite(wanted).all():
-            self._report = replace(self._report, solver_status="not finite", iterations=0)
-            return None
         wanted[:, 5] = self._onset_of_yaw(wanted[:, 5], float(stimulus.rates[2]))
+        if not np.isfinite(wanted).all():
+            return self._no_candidate("not finite", 0)
         rates = self._to_pieces @ wanted[:, 3:] * self._tuning.rotation_gain
         # yaw is a channel of its own here
         rates[:, 2] = 0.0
         rotation = self._rotation.ahead(parent, takeover, rates, STOP_TIME)
         state = stacked_state(minus(start, self._rotation.at(parent, takeover)))
-        nodes = self._grid.nodes
-        turned = np.append(nodes + 1, len(self._grid.knots) + 1)
-        aim = self._aim(wanted, rotation[1][nodes + 1], rotation[3][nodes + 1])
-        result = self._solve(state, aim, wanted, parent, takeover, rotation[1][turned])
-        if result.status is not QpStatus.SOLVED and not (
-            result.status is QpStatus.BUDGET and self._backend.name != "daqp"
-        ):
-            self._report = replace(
-                self._report, solver_status=str(result.status), iterations=result.iterations
-            )
-            return None
-        inputs = result.x[: self._rows.layout.inputs]
-        return self._lay_out(start, state, inputs, rotation, result, aim)
+        nodes = self._grid.nodes + 1
+        looks = np.append(nodes, len(rotation[0]) - 1)
+        aim = self._aim(wanted, rotation[1][nodes], rotation[3][nodes])
+        input_aim = aim @ self._to_pieces.T
+        # a yaw rate is wanted, no yaw acceleration
+        input_aim[3] = 0.0
+        result = self._programme.solve(
+            state,
+            aim,
+            input_aim,
+            self._last,
+            rotation[1][looks],
+            parent.poses(takeover + self._programme.looks),
+            self._halving.x_max,
+        )
+        if not self._usable(result):
+            return self._no_candidate(str(result.status), result.iterations)
+        inputs = result.x[: self._programme.layout.inputs]
+        tables = np.concatenate(
+            (np.zeros((3, 1, 6)), self._plant.phi @ state + self._plant.gamma @ inputs), axis=1
+        )
+        times, *laid = with_stop(rotation[0][:-1], tables[0], tables[1], tables[2], STOP_TIME)
+        pose, velocity, acceleration = (
+            part + turn for part, turn in zip(laid, rotation[1:], strict=True)
+        )
+        pose[0], velocity[0], acceleration[0] = start.pose, start.velocity, start.acceleration
+        self._tell(state, inputs, result, aim)
+        slack = float(result.x[self._programme.layout.leg]) * LEG_UNIT
+        self._pending = _Pending(pose[looks], inputs[:: self._plant.moves], start, slack)
+        return Candidate(frozen(times), frozen(pose), frozen(velocity), frozen(acceleration))
+
+    def _usable(self, result: QpResult) -> bool:
+        """An active set cut short is worthless; other methods' last iterates are plans as well."""
+        cut_short = result.status is QpStatus.BUDGET and self._tuning.backend != "daqp"
+        return (result.status is QpStatus.SOLVED or cut_short) and bool(np.isfinite(result.x).all())
+
+    def _no_candidate(self, status: str, iterations: int) -> None:
+        self._report = replace(self._report, solver_status=status, iterations=iterations)
 
     def _onset_of_yaw(self, rate: Array, now: float) -> Array:
-        self._slow_yaw += (1.0 - np.exp(-YAW_CORNER * self._period)) * (now - self._slow_yaw)
+        self._slow_yaw += self._yaw_share * (now - self._slow_yaw)
         return rate - self._slow_yaw
 
     def _aim(self, wanted: Array, turn: Array, turn_acceleration: Array) -> Array:
         """Wanted outputs minus what the vehicle's own rotation and disturbances give, (4, N)."""
-        known = np.zeros((4, len(wanted)))
+        aim: Array = wanted[:, [channel.signal for channel in CHANNELS]].T
         height = self._machine.head[2]
-        pitch, roll = turn[:, Axis.PITCH], turn[:, Axis.ROLL]
-        known[0] = -GRAVITY * pitch + height * turn_acceleration[:, Axis.PITCH]
-        known[1] = GRAVITY * roll - height * turn_acceleration[:, Axis.ROLL]
-        known[:3] += np.clip(self.disturbance, -LARGEST_DISTURBANCE, LARGEST_DISTURBANCE)[:, None]
-        aim: Array = wanted[:, SIGNALS].T - known
+        aim[0] -= -GRAVITY * turn[:, Axis.PITCH] + height * turn_acceleration[:, Axis.PITCH]
+        aim[1] -= GRAVITY * turn[:, Axis.ROLL] - height * turn_acceleration[:, Axis.ROLL]
+        bound = LARGEST_DISTURBANCE
+        disturbance = np.clip(np.nan_to_num(self.disturbance), -bound, bound)
+        aim[:3] -= disturbance[:, None]
         return aim
 
-    def _solve(self, state, aim, wanted, parent, takeover, turned):
-        layout, plant = self._rows.layout, self._plant
-        tuning = self._tuning
-        pieces = (self._to_pieces @ aim.T).T
-        pieces[3] = 0.0
-        q = self._rows.penalty.copy()
-        q[: layout.inputs] = self._cost.linear(state, aim, pieces, self._last)
-        free = plant.node_phi @ state + turned
-        nominal = parent.poses(takeover + self._looks)
-        share = self._halving.x_max / tuning.box
-        box_free = (free / tuning.box).ravel()
-        if tuning.legs:
-            side = np.where(nominal >= 0.0, 1.0, -1.0).ravel()
-            box = self._box_table * side[:, None]
-            box[np.arange(len(side)), self._box_slack] = -1.0
-            bounds = np.tile(share, len(free)) - side * box_free
-            legs = leg_rows(self._machine, nominal, self._margins)
-            leg = np.zeros((len(free) * 6, layout.size))
-            leg[:, : layout.inputs] = np.matmul(legs.gradient, plant.node_gamma).reshape(
-                -1, layout.inputs
-            ) / LEG_UNIT
-            leg[:, layout.leg] = -1.0
-            room = legs.room - np.einsum("nla,na->nl", legs.gradient, free)
-            upper = np.concatenate(
-                (1.0 - self._rows.state @ state, bounds, room.ravel() / LEG_UNIT)
-            )
-            matrices = QpMatrices(self._hessian, np.concatenate((self._rows.A, box, leg)))
-        else:
-            bounds = np.tile(share, len(free))
-            upper = np.concatenate(
-                (1.0 - self._rows.state @ state, bounds - box_free, bounds + box_free)
-            )
-            matrices = None
-            if self._fresh:
-                both = []
-                for sign in (1.0, -1.0):
-                    box = self._box_table * sign
-                    box[np.arange(len(box)), self._box_slack] = -1.0
-                    both.append(box)
-                matrices = QpMatrices(self._hessian, np.concatenate((self._rows.A, *both)))
-        self._fresh = False
-        vectors = QpVectors(
-            q, np.full(len(upper), -np.inf), upper, self._box_lower, self._box_upper
-        )
-        return self._backend.solve(vectors, matrices)
-
-    def _lay_out(self, start, state, inputs, rotation, result, aim):
-        plant = self._plant
-        tables = plant.phi @ state + plant.gamma @ inputs
-        tables = np.concatenate((np.zeros((3, 1, 6)), tables), axis=1)
-        times, pose, velocity, acceleration = with_stop(
-            rotation[0][:-1], tables[0], tables[1], tables[2], STOP_TIME
-        )
-        pose, velocity = pose + rotation[1], velocity + rotation[2]
-        acceleration = acceleration + rotation[3]
-        pose[0], velocity[0], acceleration[0] = start.pose, start.velocity, start.acceleration
-        if not np.isfinite(pose).all():
-            return None
-        layout = self._rows.layout
-        slack = float(result.x[layout.leg]) * LEG_UNIT
-        looks = np.append(self._grid.nodes + 1, len(pose) - 1)
-        self._pending = pose[looks], inputs[:: plant.moves], start, slack
+    def _tell(self, state: Array, inputs: Array, result: QpResult, aim: Array) -> None:
+        layout, plant = self._programme.layout, self._plant
         force = plant.out_phi[:, 0] @ state + plant.out_gamma[:, 0] @ inputs
         self._report = Report(
             frozen(self._halving.x_max),
             result.iterations,
             str(result.status),
             {
-                "leg_slack": slack,
-                "rate_slack": float(np.max(result.x[layout.rate])) * self._tuning.tilt_rate,
+                "leg_slack": float(result.x[layout.leg]) * LEG_UNIT,
+                "tilt_rate_slack": float(np.max(result.x[layout.rate])) * self._tuning.tilt_rate,
                 "wanted_x": float(aim[0, 0]),
                 "wanted_y": float(aim[1, 0]),
+                "wanted_z": float(aim[2, 0]),
                 "predicted_x": float(force[0]),
                 "predicted_y": float(force[1]),
+                "predicted_z": float(force[2]),
             },
         )
-        return Candidate(frozen(times), frozen(pose), frozen(velocity), frozen(acceleration))
 
     def adopt(self, plan: Plan, kappa: float) -> None:
         """Blend the rotation part alike, adapt the position limits; see `Cueing.adopt`."""
         self._rotation.adopt(plan, kappa)
-        if self._pending is None:
+        last = self._pending
+        if last is None:
             return
-        poses, inputs, start, slack = self._pending
         self._pending = None
-        self._last = self._last + kappa * (inputs - self._last)
-        self._halving.settle(poses, start, self._tuning.box, kappa < 1.0 or slack > 1e-4)
+        self._last = self._last + kappa * (last.inputs - self._last)
+        trouble = kappa < 1.0 or last.leg_slack > SLACK_NOTICED
+        self._halving.settle(last.poses, last.start, self._tuning.box, trouble)
 
     def report(self) -> Report:
         """Tell about the last step."""

@@ -95,6 +95,5 @@ def make_cost(plant: Plant, tuning: Tuning) -> Cost:
         from_state[own] += centred.T @ plant.node_phi[:-1, axis]
     # a solver needs strict convexity whatever the weights
     hessian += 1e-6 * np.eye(inputs)
-    return Cost(
-        frozen(hessian), frozen(from_state), frozen(from_error), frozen(from_input), frozen(from_last)
-    )
+    parts = (hessian, from_state, from_error, from_input, from_last)
+    return Cost(*(frozen(part) for part in parts))

@@ -56,9 +56,7 @@ def make_layout(moves: int, with_acceleration: bool) -> Layout:
     rate = inputs + 2 * moves
     leg = rate + 6
     size = leg + 1 + (2 if with_acceleration else 0)
-    return Layout(
-        inputs, slice(inputs, rate), slice(rate, leg), leg, slice(leg + 1, size), size
-    )
+    return Layout(inputs, slice(inputs, rate), slice(rate, leg), leg, slice(leg + 1, size), size)
 
 
 @dataclass(frozen=True, slots=True)

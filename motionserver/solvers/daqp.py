@@ -45,12 +45,13 @@ class Daqp:
         if matrices is not None:
             # it takes no read-only arrays
             self._matrices = QpMatrices(
-                np.require(matrices.H, np.float64, "CW"), np.require(matrices.A, np.float64, "CW")
+                np.require(matrices.H, np.float64, ["C", "W"]),
+                np.require(matrices.A, np.float64, ["C", "W"]),
             )
         assert self._matrices is not None
         upper = _bounded(np.concatenate((vectors.box_upper, vectors.upper)))
         lower = _bounded(np.concatenate((vectors.box_lower, vectors.lower)))
-        q = np.require(vectors.q, np.float64, "CW")
+        q = np.require(vectors.q, np.float64, ["C", "W"])
         if self._model is None:
             flag = self._set_up(q, upper, lower)
         elif matrices is None:

@@ -1,0 +1,130 @@
+"""The paper's programme put together: cost, soft rows, leg rows, one solve per tick."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.limits import Machine
+from motionserver.cueing.stopping import STOP_TIME
+from motionserver.cueing.thondel_cost import Cost, make_cost
+from motionserver.cueing.thondel_legs import leg_rows, margins_over, way_home_gains, with_way_home
+from motionserver.cueing.thondel_plant import Plant
+from motionserver.cueing.thondel_rows import LARGEST_INPUT, LEG_UNIT, Layout, Rows, make_rows
+from motionserver.cueing.tuning import Tuning
+from motionserver.solvers.base import QpBackend, QpMatrices, QpResult, QpVectors
+from motionserver.solvers.registry import make_backend
+
+
+class Programme:
+    """Quadratic programme of all four channels on one plant.
+
+    Args:
+        machine: Geometry and limits.
+        plant: Condensed channels.
+        tuning: Weights, thresholds, box, backend.
+
+    Attributes:
+        looks: Instants at which poses are bounded, the last one at rest, (N + 1,) [s].
+        layout: Where each variable stands.
+    """
+
+    layout: Layout
+    _cost: Cost
+    _rows: Rows
+    _backend: QpBackend
+
+    def __init__(self, machine: Machine, plant: Plant, tuning: Tuning) -> None:
+        self._machine, self._plant = machine, plant
+        instants = plant.grid.knots[plant.grid.nodes]
+        self.looks = frozen(np.append(instants, instants[-1] + STOP_TIME))
+        self._margins = margins_over(self.looks)
+        self._leg_gamma = frozen(way_home_gains(plant.node_gamma) / LEG_UNIT)
+        self._shape: tuple[object, ...] = ()
+        self.weigh(tuning)
+
+    def weigh(self, tuning: Tuning) -> None:
+        """Take other weights, thresholds or box; the solver is kept where the size allows it."""
+        self._tuning = tuning
+        self._cost = make_cost(self._plant, tuning)
+        self._rows = make_rows(self._plant, tuning)
+        self.layout = layout = self._rows.layout
+        hessian = np.diag(self._rows.curvature)
+        hessian[: layout.inputs, : layout.inputs] += self._cost.H
+        self._hessian = frozen(hessian)
+        slacks = layout.size - layout.inputs
+        inputs = np.full(layout.inputs, LARGEST_INPUT)
+        self._lowest = np.concatenate((-inputs, np.zeros(slacks)))
+        self._highest = np.concatenate((inputs, np.full(slacks, np.inf)))
+        self._box_slack = np.tile(np.arange(6) + layout.box.start, len(self.looks))
+        shape = (tuning.backend, tuning.legs, layout.size)
+        if shape != self._shape:
+            self._backend = make_backend(tuning.backend)
+            self._shape = shape
+        self._constant: QpMatrices | None = None
+        if not tuning.legs:
+            sides = [self._box_rows(np.full(len(self._box_slack), s)) for s in (1.0, -1.0)]
+            self._constant = QpMatrices(self._hessian, np.concatenate((self._rows.A, *sides)))
+        self._handed_over = False
+
+    def solve(
+        self,
+        state: Array,
+        aim: Array,
+        input_aim: Array,
+        last: Array,
+        turned: Array,
+        nominal: Array,
+        x_max: Array,
+    ) -> QpResult:
+        """Find U and slacks.
+
+        Args:
+            state: States of the channels, (S,).
+            aim: Wanted outputs minus known offsets at the nodes, (4, N).
+            input_aim: Wanted inputs, (4, M).
+            last: Inputs in force, (4,).
+            turned: The vehicle's own rotation at `looks`, (N + 1, 6).
+            nominal: Remainder of the accepted plan at `looks`, (N + 1, 6).
+            x_max: Position limits in force, (6,).
+        """
+        layout = self.layout
+        q = self._rows.penalty.copy()
+        q[: layout.inputs] = self._cost.linear(state, aim, input_aim, last)
+        free = self._plant.node_phi @ state + turned
+        rates = 1.0 - self._rows.state @ state
+        if self._constant is None:
+            matrices, limits = self._with_legs(free, nominal, x_max)
+            upper = np.concatenate((rates, limits))
+        else:
+            matrices = None if self._handed_over else self._constant
+            share = np.tile(x_max / self._tuning.box, len(free))
+            place = (free / self._tuning.box).ravel()
+            upper = np.concatenate((rates, share - place, share + place))
+        self._handed_over = True
+        lower = np.full(len(upper), -np.inf)
+        vectors = QpVectors(q, lower, upper, self._lowest, self._highest)
+        return self._backend.solve(vectors, matrices)
+
+    def _with_legs(self, free: Array, nominal: Array, x_max: Array) -> tuple[QpMatrices, Array]:
+        """Box rows of the side the nominal is on, and leg rows about the nominal."""
+        layout, box = self.layout, self._tuning.box
+        side = np.where(nominal >= 0.0, 1.0, -1.0)
+        box_room = (x_max - side * free) / box
+        home = self._machine.parked_pose
+        legs = leg_rows(self._machine, with_way_home(nominal, home), self._margins)
+        table = np.zeros((legs.room.size, layout.size))
+        table[:, : layout.inputs] = np.matmul(legs.gradient, self._leg_gamma).reshape(
+            -1, layout.inputs
+        )
+        table[:, layout.leg] = -1.0
+        room = legs.room - np.einsum("nla,na->nl", legs.gradient, with_way_home(free, home))
+        rows = np.concatenate((self._rows.A, self._box_rows(side.ravel()), table))
+        limits = np.concatenate((box_room.ravel(), room.ravel() / LEG_UNIT))
+        return QpMatrices(self._hessian, rows), limits
+
+    def _box_rows(self, side: Array) -> Array:
+        table = np.zeros((len(side), self.layout.size))
+        table[:, : self.layout.inputs] = side[:, None] * self._rows.box
+        table[np.arange(len(side)), self._box_slack] = -1.0
+        return table
