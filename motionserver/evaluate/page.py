@@ -132,10 +132,13 @@ def _plots(result: EvaluateResult) -> list[tuple[str, list[Panel]]]:
         ("Specific force at the head", _force_panels(movers)),
         ("Body rates", _rate_panels(movers)),
     ]
-    for number, drive in enumerate(movers):
-        colour = 1 + number % 5
-        out.append((f"Platform under {drive.name}", _platform_panels(drive, colour)))
+    out += [(f"Platform under {drive.name}", _platform_panels(drive)) for drive in movers]
     return out
+
+
+def _moves(curves: list[Curve]) -> bool:
+    """Whether there is anything to see."""
+    return any(float(np.max(np.abs(curve.values))) > 1e-6 for curve in curves)
 
 
 def _force_panels(movers: list[Drive]) -> list[Panel]:
@@ -146,7 +149,8 @@ def _force_panels(movers: list[Drive]) -> list[Panel]:
             Curve(d.name, d.felt()[0][:, axis], 1 + i % 5)
             for i, d in reversed([*enumerate(movers)])
         ]
-        panels.append(Panel(f"{name} [m/s²]", movers[0].times, curves, height=220))
+        if _moves(curves):
+            panels.append(Panel(f"{name} [m/s²]", movers[0].times, curves, height=220))
     return panels
 
 
@@ -158,7 +162,8 @@ def _rate_panels(movers: list[Drive]) -> list[Panel]:
             Curve(d.name, np.degrees(d.felt()[1][:, axis]), 1 + i % 5)
             for i, d in reversed([*enumerate(movers)])
         ]
-        panels.append(Panel(f"{name} [deg/s]", movers[0].times, curves, height=170))
+        if _moves(curves):
+            panels.append(Panel(f"{name} [deg/s]", movers[0].times, curves, height=170))
     tilting = [
         Curve(d.name, np.degrees(tilt_rate(d.wanted_rates, d.felt()[1])), 1 + i % 5)
         for i, d in reversed([*enumerate(movers)])
@@ -169,13 +174,11 @@ def _rate_panels(movers: list[Drive]) -> list[Panel]:
     return panels
 
 
-def _platform_panels(drive: Drive, colour: int) -> list[Panel]:
+def _platform_panels(drive: Drive) -> list[Panel]:
     machine, times = drive.machine, drive.times
     names = [axis.name.lower() for axis in Axis]
-    places = [Curve(names[i], 1e3 * drive.pose[:, i], (colour, 3, 4)[i]) for i in range(3)]
-    angles = [
-        Curve(names[i], np.degrees(drive.pose[:, i]), (colour, 3, 4)[i - 3]) for i in (3, 4, 5)
-    ]
+    places = [Curve(names[i], 1e3 * drive.pose[:, i], (1, 2, 3)[i]) for i in range(3)]
+    angles = [Curve(names[i], np.degrees(drive.pose[:, i]), (1, 2, 3)[i - 3]) for i in (3, 4, 5)]
     legs = [Curve(f"leg {i + 1}", 1e3 * drive.legs[:, i], i) for i in range(6)]
     ends = (1e3 * machine.leg_min, 1e3 * machine.leg_max)
     panels = [
@@ -188,9 +191,9 @@ def _platform_panels(drive: Drive, colour: int) -> list[Panel]:
         return panels
     limits = [
         Curve(f"{names[i]} [mm or deg]", (1e3 if i < 3 else degrees(1.0)) * periods.x_max[:, i], c)
-        for i, c in ((0, colour), (1, 3), (3, 4), (4, 5))
+        for i, c in ((0, 1), (1, 2), (3, 3), (4, 4))
     ]
-    kappa = Curve("", np.nan_to_num(periods.kappa), colour)
+    kappa = Curve("", np.nan_to_num(periods.kappa), 1)
     return [
         *panels,
         Panel("X_max: position limits in force", periods.times, limits, bounds=(0.0, 240.0)),

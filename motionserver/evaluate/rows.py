@@ -68,7 +68,7 @@ def sections(result: EvaluateResult) -> list[Section]:
     ]
     for name, title in _AXES.items():
         axes = [figures.axis(name) for figures in columns]
-        if any(axis.rmse > 0.0 or axis.wanted_rms > 0.0 for axis in axes):
+        if any(max(axis.rmse, axis.wanted_rms) > 1e-6 for axis in axes):
             out.append(Section(title, _axis_rows(axes)))
     out.append(Section("What the person notices", _comfort_rows([f.comfort for f in columns])))
     out.append(Section("Workspace (executed samples, plain differences)", _workspace_rows(columns)))
@@ -88,7 +88,12 @@ def _axis_rows(axes: list[AxisFigures]) -> tuple[Row, ...]:
         _row("nRMSE above 0.5 Hz (onset)", axes, lambda a: a.nrmse_onset, less=True),
         _row("perceived-error nRMSE", axes, lambda a: a.perceived_nrmse, less=True),
         _row("correlation at no lag", axes, lambda a: a.correlation, more=True),
-        _row("best lag [ms]", axes, lambda a: None if a.lag is None else 1e3 * a.lag, "{:.0f}"),
+        _row(
+            "best lag of -200 to 1000 [ms]",
+            axes,
+            lambda a: None if a.lag is None else 1e3 * a.lag,
+            "{:.0f}",
+        ),
         _row("correlation at best lag", axes, lambda a: a.lag_correlation, more=True),
         _row("gain at best lag", axes, lambda a: a.gain),
         _row("R2 of that gain", axes, lambda a: a.r2, more=True),

@@ -61,9 +61,8 @@ def tilt_rate(wanted_rates: Array, felt_rates: Array) -> Array:
 
 def washout_against(wanted_force: Array, acceleration: Array) -> Array:
     """Translational acceleration against the wanted force, x and y, (N, 2) [m/s2]."""
-    opposed = acceleration[:, :2] * np.sign(wanted_force[:, :2])
-    out: Array = np.maximum(0.0, -opposed)
-    return out
+    along = acceleration[:, :2] * np.sign(wanted_force[:, :2])
+    return np.where(along < 0.0, -along, 0.0)
 
 
 def comfort_figures(
