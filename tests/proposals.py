@@ -232,11 +232,10 @@ def goals(machine):
     out = {"stranded": [], "swung": [], "singular": []}
     for pose in poses[inside]:
         ways = [straight_way(machine, pose, home) for home in (STILL, machine.parked_pose)]
-        free = [
-            way.legs.min() > machine.leg_min + 1e-3 and way.legs.max() < machine.leg_max - 1e-3
-            for way in ways
-        ]
-        if not free[0]:
+        home, parked = (
+            max(machine.leg_min - way.legs.min(), way.legs.max() - machine.leg_max) for way in ways
+        )
+        if home > -1e-3:
             continue
         swing = joint_angles(machine, ways[0].poses).max() > machine.joint_angle
         ratio = conditioning(machine, ways[0].poses).min() / neutral_conditioning(machine)
@@ -244,6 +243,6 @@ def goals(machine):
             out["swung"].append(pose)
         elif ratio < machine.conditioning:
             out["singular"].append(pose)
-        elif not free[1]:
+        elif parked > 0.0:
             out["stranded"].append(pose)
     return out
