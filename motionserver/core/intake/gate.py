@@ -38,6 +38,7 @@ class Gate:
         self.freshness = Freshness()
         self.owner: Owner | None = None
         self.mode = DriveMode.DRIVE
+        self.lost = 0
         self._may_change_owner = may_change_owner
         self._sequence: int | None = None
         self._least_offset: float | None = None
@@ -70,6 +71,8 @@ class Gate:
             self._hand_over(who)
         elif self._is_old(motion):
             return "old"
+        if motion.sequence is not None and self._sequence is not None:
+            self.lost += max(0, ((motion.sequence - self._sequence) & 0xFFFFFFFF) - 1)
         self._sequence = motion.sequence
         self.mode = motion.mode
         self.freshness.arrived(now)

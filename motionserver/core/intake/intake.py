@@ -51,6 +51,11 @@ class Intake:
         self._rates = np.zeros(3)
         self._blanked = False
 
+    @property
+    def newest(self) -> VehicleMotion | None:
+        """The newest packet taken."""
+        return self._newest
+
     def offer(self, motion: VehicleMotion) -> None:
         """Take a believed packet; the newest wins."""
         last = self._newest

@@ -34,7 +34,11 @@ class Guard:
         self.homes = frozen(np.stack((NEUTRAL, config.machine.parked_pose)))
         self.record = GuardRecord()
         self.supervisor = Supervisor(
-            config.machine, config.patience, config.send_period, config.plan_period
+            config.machine,
+            config.patience,
+            config.send_period,
+            config.plan_period,
+            config.dry_run,
         )
         self._last = Setpoint(
             Order.WAIT, PlatformState.at_rest(NEUTRAL), leg_lengths(self.machine, NEUTRAL)
@@ -77,7 +81,7 @@ class Guard:
                 refusal = self._reset(now)
             elif request.op != "engage":
                 refusal = f"unknown request {request.op!r}; allowed: engage, park, reset"
-            elif self.config.engage != request.by:
+            elif request.by not in ("console", self.config.engage):
                 refusal = (
                     f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
                 )
@@ -146,7 +150,8 @@ class Guard:
             playback = record.playback
             travel = 0.0 if playback is None else playback.remaining + playback.newest.way_home
             self._allow(2.0 * (travel + self.config.patience.lowering), now_ns)
-        elif state in (State.PARKED, State.OFFLINE):
+        elif state in (State.PARKED, State.OFFLINE, State.SAFE):
+            # a device that stopped by itself plays nothing: what follows begins where it stands
             record.playback = None
             self.supervisor.device.forgive()
 
@@ -161,7 +166,7 @@ class Guard:
             self.supervisor.inconsistent = f"cannot stand here: {accepted}"
             record.note(now_ns, self.supervisor.inconsistent)
         else:
-            record.playback = Playback(accepted)
+            record.playback = Playback(accepted, accepted.plan.duration)
         self.supervisor.device.forgive()
 
     def _start_from_measured(self, now_ns: int) -> None:
@@ -193,9 +198,11 @@ class Guard:
         if not bool(inside.all()):
             # cannot happen on an accepted plan: if it does, stand where the platform was last sent
             self.supervisor.inconsistent = "an accepted plan led outside the stroke"
+            record.playback = None
             return self._last
-        setpoint = Setpoint(order, state, frozen(legs[0]))
-        if order is Order.FOLLOW:
+        sent = Order.WAIT if self.config.dry_run else order
+        setpoint = Setpoint(sent, state, frozen(legs[0]))
+        if sent is Order.FOLLOW:
             self.supervisor.astray = self.supervisor.device.track(now_ns, legs[0], speeds[0])
         self._last = setpoint
         record.counters["setpoints"] += 1

@@ -20,6 +20,7 @@ class GuardConfig:
         plan_period: Period of the planner [s].
         engage: Who may engage: "console", "http" or "auto".
         patience: How long each silence is borne.
+        dry_run: True: play everything, but send only the mode word, which moves nothing.
     """
 
     machine: Machine
@@ -27,6 +28,7 @@ class GuardConfig:
     plan_period: float
     engage: str = "console"
     patience: Patience = field(default_factory=Patience)
+    dry_run: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,51 @@
+"""evaluate, reproduce, bench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from motionserver.errors import ConfigError
+from motionserver.evaluate.bench.command import run_bench as measure
+from motionserver.evaluate.command import evaluate
+from motionserver.evaluate.reproduce import reproduce
+from motionserver.settings.machine import load_machine
+
+PAPERS = ("thondel2014",)
+BENCHES = ("loop", "plan", "latency", "all")
+
+
+def run_evaluate(
+    recording: Path,
+    algorithm: str,
+    platform: str,
+    scale: float,
+    rate: float,
+    setpoints: Path | None,
+    json_out: Path | None,
+    html_out: Path | None,
+) -> int:
+    """Evaluate and print; 1 if any limit was broken."""
+    return evaluate(
+        recording,
+        [name.strip() for name in algorithm.split(",") if name.strip()],
+        load_machine(platform),
+        scale=scale,
+        rate=rate,
+        setpoints=setpoints,
+        json_out=json_out,
+        html_out=html_out,
+    )
+
+
+def run_reproduce(paper: str, out: Path) -> int:
+    """Redraw a paper; 1 if a claim no longer holds."""
+    if paper not in PAPERS:
+        raise ConfigError("PAPER", f"unknown {paper!r}", f"Allowed: {', '.join(PAPERS)}.")
+    return reproduce(out)
+
+
+def run_bench(what: str, seconds: float, json_out: Path | None) -> int:
+    """Measure and print."""
+    if what not in BENCHES:
+        raise ConfigError("bench", f"unknown {what!r}", f"Allowed: {', '.join(BENCHES)}.")
+    return measure(what, seconds, json_out)

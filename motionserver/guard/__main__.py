@@ -1,0 +1,33 @@
+"""Entry of the guard process: ``python -m motionserver.guard RUN_DIR SOCKET_FD [leave]``."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import logging
+import sys
+from pathlib import Path
+
+from motionserver.guard.loop import GuardLoop
+from motionserver.guard.options import read_options
+from motionserver.guard.ports import open_link
+from motionserver.telemetry.parent import follow_parent
+
+
+def main() -> int:
+    """Wait for the guard's lock, then run: the second process started is a warm spare."""
+    follow_parent()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
+    run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
+    options = read_options(run_dir)
+    link = open_link(descriptor)
+    with (run_dir / "guard.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        loop = GuardLoop(options, run_dir, link)
+        if sys.argv[3:] == ["leave"]:
+            loop.ask_to_leave("its predecessor died while parking")
+        return asyncio.run(loop.run())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

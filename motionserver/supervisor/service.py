@@ -1,0 +1,186 @@
+"""The service: opens the platform's socket, starts and watches guard, planner and page."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import fcntl
+import json
+import logging
+import os
+import signal
+import socket
+from pathlib import Path
+from typing import Any, Final, TextIO
+
+from motionserver.core.safety.states import CUED
+from motionserver.errors import ConfigError
+from motionserver.supervisor.child import Child
+from motionserver.telemetry.link import STATES, GuardClock, Maps
+from motionserver.telemetry.ticker import now_ns
+
+PARK_PATIENCE: Final = 90.0
+"""Longest wait for the guard to park when the service ends [s]."""
+
+log = logging.getLogger("motionserver.supervisor")
+
+
+class Service:
+    """One server on one platform."""
+
+    def __init__(
+        self, resolved: dict[str, Any], config_web: bool, local: tuple[str, int], run_dir: Path
+    ) -> None:
+        """Take the run directory and the platform's socket.
+
+        Args:
+            resolved: What `settings.resolve` made of the configuration.
+            config_web: True if the page is wanted.
+            local: Local address of the platform's socket.
+            run_dir: Where the processes meet.
+
+        Raises:
+            ConfigError: Another server runs here, or an address cannot be bound.
+        """
+        self.run_dir = run_dir
+        self._lock = self._take(run_dir)
+        self._link = _open_link(local)
+        self.local_port: int = self._link.getsockname()[1]
+        web = dict(resolved["web"])
+        core = {key: value for key, value in resolved.items() if key != "web"}
+        (run_dir / "config.json").write_text(json.dumps(core), "utf-8")
+        (run_dir / "web.json").write_text(json.dumps(web), "utf-8")
+        (run_dir / "tuning.json").unlink(missing_ok=True)
+        for stale in run_dir.glob("*.map"):
+            stale.unlink()
+        self._maps = Maps(run_dir, create=True)
+        descriptor = self._link.fileno()
+        guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
+        self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
+        self.planner = Child("planner", ("-m", "motionserver.planner", str(run_dir)))
+        self.planner.may_start = self._is_not_cued
+        self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
+        self.web.wanted = config_web
+        self._leave = asyncio.Event()
+        self.exit_status = 0
+
+    @staticmethod
+    def _take(run_dir: Path) -> TextIO:
+        run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if run_dir.stat().st_uid != os.getuid():
+            raise ConfigError(
+                "[server] run_dir", f"{run_dir} belongs to somebody else", "Choose another folder."
+            )
+        run_dir.chmod(0o700)
+        lock = (run_dir / "service.lock").open("w")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(
+                "[server] run_dir",
+                f"another server runs in {run_dir}",
+                "Stop it first: one platform has one server.",
+            ) from error
+        return lock
+
+    def leave(self) -> None:
+        """End softly: park, then stop everything."""
+        self._leave.set()
+
+    async def run(self) -> int:
+        """Run until told to leave and parked.
+
+        Returns:
+            0 if the guard ended parked, 3 if it ended standing in a fault.
+        """
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self.leave)
+        keepers = [
+            asyncio.create_task(child.keep()) for child in (*self.guards, self.planner, self.web)
+        ]
+        watcher = asyncio.create_task(self._show())
+        await self._leave.wait()
+        log.info("parking")
+        self.exit_status = await self._park()
+        watcher.cancel()
+        await asyncio.gather(
+            self.planner.end(signal.SIGTERM, 3.0), self.web.end(signal.SIGTERM, 3.0)
+        )
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
+        self._link.close()
+        self._lock.close()
+        return self.exit_status
+
+    async def _park(self) -> int:
+        """Let the active guard park; the spare goes first, it has nothing to do."""
+        active, spare = self._active()
+        active.wanted = spare.wanted = False
+        await spare.end(signal.SIGKILL, 1.0)
+        deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
+        active.signal(signal.SIGTERM)
+        while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
+            try:
+                status = await active.ended(left)
+            except TimeoutError:
+                break
+            if status in (0, 3):
+                return status
+            # it was killed while parking: its successor must park too
+            log.warning("%s ended with %s while parking; starting it again", active.name, status)
+            await active.start("leave")
+        await active.end(signal.SIGKILL, 1.0)
+        return 3
+
+    def _is_not_cued(self) -> bool:
+        """A planner that died is replaced once the platform parks: its successor knows nothing."""
+        message = self._maps.clock.read()
+        return message is None or STATES[GuardClock.unpack(message[1]).state] not in CUED
+
+    def _active(self) -> tuple[Child, Child]:
+        """The guard that holds the lock, by its own word, and the other."""
+        message = self._maps.guard.read()
+        pid = None if message is None else json.loads(message[1])["pid"]
+        first, second = self.guards
+        return (second, first) if second.pid == pid and pid is not None else (first, second)
+
+    async def _show(self) -> None:
+        """Tell the page who lives."""
+        while True:
+            active, spare = self._active()
+            self._maps.service.write(
+                json.dumps(
+                    {
+                        "pid": os.getpid(),
+                        "t_ns": now_ns(),
+                        "guard": active.pid,
+                        "spare": spare.pid,
+                        "planner": self.planner.pid,
+                        "web": self.web.pid,
+                        "restarts": {
+                            "guard": sum(child.restarts for child in self.guards),
+                            "planner": self.planner.restarts,
+                            "web": self.web.restarts,
+                        },
+                    }
+                ).encode()
+            )
+            await asyncio.sleep(0.1)
+
+
+def _open_link(local: tuple[str, int]) -> socket.socket:
+    link = socket.socket(socket.AF_INET6 if ":" in local[0] else socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        link.bind(local)
+    except OSError as error:
+        link.close()
+        hint = "Choose another local_port, or stop the program that holds it."
+        if error.errno == 13:
+            hint = "Ports below 1024 need CAP_NET_BIND_SERVICE; or choose another local_port."
+        raise ConfigError(
+            "[platform] local_host, local_port",
+            f"{local[0]}:{local[1]} cannot be bound ({error.strerror})",
+            hint,
+        ) from error
+    return link
