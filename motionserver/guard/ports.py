@@ -119,8 +119,11 @@ class Ports:
             self._counters["send_errors"] += 1
 
     def show(self, snapshot: bytes) -> None:
-        """Publish the snapshot for the page."""
-        self._maps.guard.write(snapshot)
+        """Publish the snapshot for the page; one that is too long is counted."""
+        try:
+            self._maps.guard.write(snapshot)
+        except ValueError:
+            self._counters["snapshots_too_long"] += 1
 
 
 def open_link(descriptor: int) -> socket.socket:
