@@ -17,7 +17,6 @@ from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.page import to_html
 from motionserver.evaluate.recording import Recording, read_recording
-from motionserver.evaluate.report import to_text
 from motionserver.evaluate.result import EvaluateResult, to_json
 from motionserver.evaluate.setpoints import write_setpoints
 from motionserver.evaluate.yardstick import find_yardstick
@@ -99,22 +98,6 @@ def evaluate(
     if html_out is not None:
         Path(html_out).write_text(to_html(result), encoding="utf-8")
     return result
-
-
-def evaluate_and_print(
-    input_csv: str | Path,
-    algorithms: Sequence[str],
-    machine: Machine,
-    scale: float,
-    rate: float = RATE_HZ,
-    setpoints: str | Path | None = None,
-    json_out: str | Path | None = None,
-    html_out: str | Path | None = None,
-) -> int:
-    """`evaluate`, its table to standard output; for the shell 1 if any limit was broken, else 0."""
-    result = evaluate(input_csv, algorithms, machine, scale, rate, setpoints, json_out, html_out)
-    print(to_text(result), end="")  # noqa: T201
-    return 1 if result.violations else 0
 
 
 def _timed(

@@ -9,8 +9,7 @@ import pytest
 
 from motionserver.core.axes import Axis
 from motionserver.errors import ConfigError
-from motionserver.evaluate.reproduce import reproduce
-from motionserver.evaluate.reproduce.command import numbers, write
+from motionserver.evaluate.reproduce.command import numbers, reproduce, write
 from motionserver.evaluate.reproduce.paper import (
     PAPER,
     mpc,
@@ -86,10 +85,10 @@ def test_noise_on_the_measured_acceleration_breaks_no_limit():
 
 def test_unknown_paper_and_folder_are_refused(tmp_path):
     with pytest.raises(ConfigError, match="Allowed: thondel2014"):
-        reproduce(tmp_path, "thondel2015")
+        reproduce("thondel2015", tmp_path)
     (tmp_path / "file").write_text("")
     with pytest.raises(ConfigError, match="cannot be made"):
-        reproduce(tmp_path / "file")
+        reproduce("thondel2014", tmp_path / "file")
 
 
 @pytest.mark.campaign

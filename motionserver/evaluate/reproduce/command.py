@@ -21,12 +21,12 @@ PAPERS: Final = ("thondel2014",)
 """What can be reproduced."""
 
 
-def reproduce(out: str | Path = "out/thondel2014", paper: str = "thondel2014") -> int:
+def reproduce(paper: str = "thondel2014", out: str | Path = "out/thondel2014") -> int:
     """Run it, write ``numbers.json, fig3.svg, fig4.svg, index.html``, print every claim.
 
     Args:
-        out: Folder, made if it does not exist.
         paper: One of `PAPERS`.
+        out: Folder, made if it does not exist.
 
     Returns:
         0 if every claim holds, else 1: for the shell.
