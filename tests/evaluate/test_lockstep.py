@@ -132,6 +132,25 @@ def test_algorithm_that_raises_is_counted_and_the_platform_rests():
     assert not driven.pose.any()
 
 
+def test_preview_is_told_ahead_and_ends_with_the_recording():
+    heard = []
+
+    class Listener(Thinker):
+        def think(self, parent, before, takeover, stimulus, plan_id):
+            heard.append(stimulus.preview)
+            return super().think(parent, before, takeover, stimulus, plan_id)
+
+    times = np.arange(101) / 100.0
+    force = np.column_stack((times, np.zeros(101), np.full(101, GRAVITY)))
+    ramp = from_samples("ramp", times, force, np.zeros((101, 3)), np.zeros(101))
+    thinker = Listener(MACHINE, Tuning(algorithm="classical"), 0.01, MACHINE.parked_pose[None])
+    drive(MACHINE, ramp, Tuning(scale=0.5), preview=0.5, thinker=thinker)
+    assert heard[20].times == pytest.approx(np.arange(1, 11) * 0.05)
+    assert heard[20].force[:, 0] == pytest.approx(0.5 * (0.2 + heard[20].times))
+    assert len(heard[80].times) == 4
+    assert heard[100] is None
+
+
 def test_no_motion_has_the_whole_error():
     still = no_motion(MACHINE, BRAKE, 0.6)
     figures = figures_of(still)
