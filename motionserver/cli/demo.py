@@ -137,8 +137,8 @@ class Demo:
             victim.signal(signal.SIGKILL)
 
     async def _until(self, state: str) -> None:
-        while state not in self._states[-1:]:
-            await asyncio.sleep(0.02)  # noqa: ASYNC110 - another process's state is polled
+        while state not in self._states[-1:]:  # noqa: ASYNC110 (another process decides)
+            await asyncio.sleep(0.02)
 
     async def _show(self, run_dir: Path) -> None:
         guard, planner = MappedFile(run_dir / "guard.map"), MappedFile(run_dir / "planner.map")

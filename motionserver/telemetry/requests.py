@@ -79,8 +79,9 @@ def ask(path: Path, request: dict[str, Any], timeout: float = 1.0) -> dict[str, 
     """
     own = path.parent / f"ask-{os.getpid()}-{next(_numbers)}.sock"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as link:
-        link.bind(str(own))
         try:
+            own.unlink(missing_ok=True)
+            link.bind(str(own))
             link.settimeout(timeout)
             link.sendto(json.dumps(request).encode(), str(path))
             answer = json.loads(link.recv(65536))

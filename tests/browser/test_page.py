@@ -97,7 +97,7 @@ class Visit:
 
     def expect(self, selector, text):
         self.page.wait_for_function(
-            "([s, t]) => document.querySelector(s).textContent.includes(t)", arg=[selector, text]
+            "([s, t]) => document.querySelector(s)?.textContent.includes(t)", arg=[selector, text]
         )
 
     def value(self, name):

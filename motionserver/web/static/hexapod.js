@@ -140,12 +140,11 @@ export class Hexapod {
     const [o, s] = see([origin, seat]);
     this.line(s, o, "rgba(232,237,242,.45)", 2);
     const arms = carried([[0.42, 0, 0], [0, 0.42, 0], [0, 0, 0.42]].map((a) => a.map((v, i) => v + head[i])), this.pose);
-    [["x", "#e69f00"], ["y", "#35c9a3"], ["z", "#d79ac0"]].forEach(([name, colour], i) => {
+    [["x fwd", "#e69f00"], ["y", "#35c9a3"], ["z", "#d79ac0"]].forEach(([name, colour], i) => {
       const tip = this.project(arms[i]);
       this.line(o, tip, colour, 2.2);
-      this.label([tip[0] + (tip[0] - o[0]) * 0.16, tip[1] + (tip[1] - o[1]) * 0.16], name, colour);
+      this.label([tip[0] + (tip[0] - o[0]) * (i ? 0.16 : 0.4), tip[1] + (tip[1] - o[1]) * 0.16], name, colour);
     });
-    this.label(this.project([2.6, 0, 0]), "front", "#9fadba");
     this.dot(o, 8, "#0d1217");
     this.dot(o, 6.2, "#e8edf2");
   }

@@ -3,6 +3,7 @@ import { send, sentence } from "./api.js";
 import { byId, make, put } from "./dom.js";
 
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser"];
+const LASTING = 6; // looks, ten a second
 const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
@@ -12,6 +13,7 @@ export class Tuning {
     this.rows = new Map();
     this.mayTune = false;
     this.busy = false;
+    this.differing = 0;
     byId("tuning").addEventListener("submit", (e) => { e.preventDefault(); this.apply(); });
     byId("discard").addEventListener("click", () => this.fill(this.values));
     byId("undo").addEventListener("click", () => this.undo());
@@ -116,9 +118,12 @@ export class Tuning {
     byId("apply").title = this.mayTune ? "" : "needs the tuner's or operator's token";
   }
 
-  // Somebody else changed the tuning: show it, unless changes are pending here.
+  // Somebody else changed the tuning: show it, unless changes are pending here. The status may be
+  // older than an answer just received, so a difference counts only once it has lasted.
   noticed(version) {
-    if (this.version === null || version === undefined || version === this.version || this.busy) return;
+    const differs = this.version !== null && version !== undefined && version !== this.version && !this.busy;
+    this.differing = differs ? this.differing + 1 : 0;
+    if (this.differing !== LASTING) return;
     if (Object.keys(this.changes()).length === 0) this.load();
     else this.say(`The tuning is at version ${version} by now; apply will be refused until you discard.`, true);
   }
