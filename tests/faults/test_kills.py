@@ -9,8 +9,8 @@ from random import Random
 from typing import Any
 
 import pytest
-from motion_clients.motion_log import read_motion_log
 from motion_clients.moog_wire import Mcw
+from motion_clients.motion_log import read_motion_log
 from rig import Rig, assert_soft, is_alive, until
 
 BACK_TO_PARKED = ("PARKING", "PARKED")
