@@ -85,7 +85,7 @@ class Demo:
             driving = asyncio.create_task(self._drive(service, folder, cue))
             # whatever ends the drive, a mistake of ours too, ends the demo
             driving.add_done_callback(lambda _: service.leave())
-            showing = asyncio.create_task(self._show(service, folder / "run"))
+            showing = asyncio.create_task(self._show(folder / "run"))
             status = await serving
             await asyncio.sleep(2 * SHOW_EVERY)
             for task in (driving, showing):
@@ -153,7 +153,7 @@ class Demo:
             await asyncio.sleep(SHOW_EVERY)
         return True
 
-    async def _show(self, service: Service, run_dir: Path) -> None:
+    async def _show(self, run_dir: Path) -> None:
         guard, planner = MappedFile(run_dir / "guard.map"), MappedFile(run_dir / "planner.map")
         tick = 0
         while True:

@@ -17,9 +17,9 @@ from motionserver.errors import ConfigError
 from motionserver.settings.config import split_address
 from motionserver.telemetry.realtime import take_priority
 
+PUNCTUAL = 20
+"""Real-time priority to ask for: a base and a simulator are punctual, an emulated one must be."""
 EMULATORS = ("moog-6dof2000e",)
-EMULATOR_FIFO = 20
-"""Real-time priority asked for: a real base has a computer of its own, this one must share."""
 
 
 def _address(option: str, text: str) -> tuple[str, int]:
@@ -43,7 +43,7 @@ def emulate(
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)
-    take_priority(EMULATOR_FIFO, True)
+    take_priority(PUNCTUAL, wanted=True)
     cut = LinkFlaws()
     if cut_after is not None:
         begin = time.monotonic() + cut_after
@@ -70,6 +70,7 @@ def replay(recording: str, to: str, form: str, loop: bool, preview: float) -> st
         raise ConfigError("--format", f"unknown {form!r}", f"Allowed: {', '.join(FORMATS)}.")
     path = recording_path(recording) if recording in recording_names() else Path(recording)
     host, port = _address("--to", to)
+    take_priority(PUNCTUAL, wanted=True)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

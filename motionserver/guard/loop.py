@@ -127,10 +127,15 @@ class GuardLoop:
             if self._sent_slot >= 0:
                 counters["missed_slots"] += send_slot - self._sent_slot - 1
             self._sent_slot = send_slot
-            due = self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns
-            self._ports.publish(now, int(due), self.guard.record)
-            self._ports.send(setpoint)
             self._sends.append(now)
+        # the planner must know of an acceptance at once, or it continues the wrong parent
+        if setpoint is not None or self._ports.has_news(self.guard.record):
+            due = self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns
+            self._ports.publish(
+                self._sends[-1] if self._sends else now, now, int(due), self.guard.record
+            )
+        if setpoint is not None:
+            self._ports.send(setpoint)
             self._setpoint = setpoint
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):

@@ -20,6 +20,7 @@ from motionserver.settings.problems import config_error
 
 Port = Annotated[int, Field(ge=1, le=65535)]
 AnyPort = Annotated[int, Field(ge=0, le=65535)]
+Arm = Annotated[float, Field(allow_inf_nan=False, ge=-10.0, le=10.0)]
 PREFIX = "MOTIONSERVER_"
 
 
@@ -53,7 +54,7 @@ class PlatformSection(Strict):
     leg_order: tuple[int, int, int, int, int, int] = (0, 1, 2, 3, 4, 5)
     heave_neutral_m: Annotated[float, Field(ge=-2.0, le=2.0)] = -0.2286
     engage_word: Literal[175, 180] = 180
-    head_m: tuple[float, float, float] | None = None
+    head_m: tuple[Arm, Arm, Arm] | None = None
 
     @field_validator("leg_order")
     @classmethod
@@ -85,7 +86,7 @@ class CueingSection(Strict):
 
     algorithm: str = "thondel2014"
     scale: Annotated[float, Field(ge=0.0, le=1.0)] = 0.6
-    vehicle_head_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    vehicle_head_m: tuple[Arm, Arm, Arm] = (0.0, 0.0, 0.0)
     budget_ms: Annotated[float, Field(ge=1.0, le=50.0)] = 10.0
     rate_max_hz: Annotated[float, Field(ge=20.0, le=200.0)] = 120.0
     tuning: dict[str, Any] = Field(default_factory=dict)
@@ -167,7 +168,7 @@ def load_config(path: Path | None, overrides: Mapping[str, Any] | None = None) -
     if path is not None:
         try:
             text = path.read_text("utf-8")
-            data = {**tomllib.loads(text), **data}
+            data = _merged(tomllib.loads(text), data)
         except OSError as error:
             raise ConfigError(
                 str(path), f"cannot be read ({error.strerror})", "Give the path of a TOML file."
@@ -182,6 +183,16 @@ def load_config(path: Path | None, overrides: Mapping[str, Any] | None = None) -
         raise ConfigError(
             "environment", str(error), f"Correct the {PREFIX}... variable."
         ) from error
+
+
+def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    out = dict(base)
+    for key, value in over.items():
+        below = out.get(key)
+        if isinstance(below, dict) and isinstance(value, Mapping):
+            value = _merged(below, value)
+        out[key] = value
+    return out
 
 
 def run_dir_of(config: Config) -> Path:

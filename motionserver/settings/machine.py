@@ -17,8 +17,10 @@ from motionserver.core.safety.verify import GUARD_MARGINS, check_ways_home
 from motionserver.errors import ConfigError
 from motionserver.settings.problems import config_error
 
-Metre = Annotated[float, Field(allow_inf_nan=False, ge=-20.0, le=20.0)]
-Positive = Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e4)]
+PACE_SHARE = 0.9
+"""Most of a leg limit that raising and parking may use: a move must pass the same check."""
+Metre = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-20.0, le=20.0)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1e4)]
 Point = tuple[Metre, Metre, Metre]
 Joints = tuple[Point, Point, Point, Point, Point, Point]
 
@@ -89,9 +91,10 @@ def load_machine(name: str) -> Machine:
     if name.endswith(".toml"):
         try:
             text = path.read_text("utf-8")
-        except OSError as error:
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
             raise ConfigError(
-                name, f"cannot be read ({error.strerror})", "Give the path of a machine file."
+                name, f"cannot be read ({why})", "Give the path of a machine file."
             ) from error
     elif name in machine_presets():
         path = Path(f"{name}.toml")
@@ -168,11 +171,17 @@ def _check(machine: Machine, path: Path) -> None:
                 f"no allowed straight way between neutral and the parked pose ({rejection})",
                 "Check neutral_height, the joints, legs.min, legs.max and workspace.parked.",
             )
-    pace = machine.pace
-    if pace.speed > machine.leg_speed or pace.acceleration > machine.leg_acceleration:
-        raise ConfigError(
-            f"{path}: pace", "faster than the legs' own limits", "Raise and park more gently."
-        )
+    for what, pace, limit in (
+        ("speed", machine.pace.speed, machine.leg_speed),
+        ("acceleration", machine.pace.acceleration, machine.leg_acceleration),
+        ("jerk", machine.pace.jerk, machine.leg_jerk),
+    ):
+        if limit is not None and pace > PACE_SHARE * limit:
+            raise ConfigError(
+                f"{path}: pace.{what}",
+                f"{pace:g} is more than {PACE_SHARE:.0%} of the legs' own limit {limit:g}",
+                f"Raise and park more gently: at most {PACE_SHARE * limit:g}.",
+            )
 
 
 def unchecked_limits(machine: Machine) -> list[str]:

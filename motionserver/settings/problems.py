@@ -14,7 +14,7 @@ from motionserver.errors import ConfigError
 def config_error(
     error: ValidationError, path: Path | None, text: str, model: type[BaseModel]
 ) -> ConfigError:
-    """Word the first problem of a validation error.
+    """Word the most telling problem of a validation error.
 
     Args:
         error: What pydantic found.
@@ -25,7 +25,8 @@ def config_error(
     Returns:
         The error to raise.
     """
-    first = error.errors()[0]
+    # a mistyped key is missing as well: say what was typed
+    first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     keys = [str(part) for part in first["loc"]]
     where = f"{path}{_line(text, keys)}: " if path is not None else ""
     where += ".".join(keys) or "the whole file"
@@ -42,16 +43,36 @@ def config_error(
 
 
 def _line(text: str, keys: list[str]) -> str:
-    for key in reversed(keys):
-        for number, line in enumerate(text.splitlines(), 1):
-            if re.match(rf"\s*(\[+.*\b{re.escape(key)}\b.*\]+|{re.escape(key)}\s*=)", line):
-                return f":{number}"
-    return ""
+    """Line of the key, searched inside its own section; of the section if the key is missing."""
+    lines = text.splitlines()
+    names = [key for key in keys if not key.isdigit()]
+    index = next((int(key) for key in keys if key.isdigit()), 0)
+    found, begin = 0, 0
+    for depth in range(len(names), 0, -1):
+        section = r"\s*\.\s*".join(re.escape(name) for name in names[:depth])
+        headers = [
+            number
+            for number, line in enumerate(lines, 1)
+            if re.match(rf"\s*\[+\s*{section}\s*\]+", line)
+        ]
+        if headers:
+            begin = found = headers[min(index, len(headers) - 1)]
+            names = names[depth:]
+            break
+    for number, line in enumerate(lines[begin:], begin + 1):
+        if re.match(r"\s*\[+[\w\s.\"']+\]+\s*(#.*)?$", line):
+            break
+        if names and re.match(rf"\s*({re.escape(names[0])}\b)\s*[.=]", line):
+            found = number
+            break
+    return f":{found}" if found else ""
 
 
 def _known(model: type[BaseModel], keys: list[str]) -> list[str]:
     current: object = model
     for key in keys:
+        if key.isdigit():
+            continue
         if isinstance(current, type) and issubclass(current, BaseModel):
             field = current.model_fields.get(key)
             current = None if field is None else field.annotation

@@ -16,6 +16,12 @@ from zlib import crc32
 _MAGIC: Final = 0x4D53_4D46
 _HEAD: Final = struct.Struct("<II")
 _SLOT: Final = struct.Struct("<QII")
+_ATTEMPTS: Final = 4
+
+
+def _crc(sequence: int, data: bytes) -> int:
+    """Over the sequence as well, so that a torn header is seen."""
+    return crc32(data, crc32(sequence.to_bytes(8, "little")))
 
 
 class MappedFile:
@@ -48,7 +54,9 @@ class MappedFile:
             )
         if capacity is not None and capacity != self.capacity:
             raise ValueError(f"{path}: {self.capacity} bytes per slot, {capacity} wanted")
-        self._sequence = max(self._header(slot)[0] for slot in (0, 1))
+        # go on after the newest whole message: a torn header must not turn us onto its slot
+        newest = self.read()
+        self._sequence = self.newest_sequence() if newest is None else newest[0]
 
     @staticmethod
     def _create(path: Path, capacity: int) -> None:
@@ -78,7 +86,7 @@ class MappedFile:
         offset = self._offset(self._sequence & 1)
         body = offset + _SLOT.size
         self._map[body : body + len(data)] = data
-        crc = crc32(data, self._sequence & 0xFFFFFFFF)
+        crc = _crc(self._sequence, data)
         _SLOT.pack_into(self._map, offset, self._sequence, len(data), crc)
 
     def newest_sequence(self) -> int:
@@ -87,14 +95,16 @@ class MappedFile:
 
     def read(self) -> tuple[int, bytes] | None:
         """The newest complete message with its sequence; None before the first."""
-        for slot in sorted((0, 1), key=lambda s: self._header(s)[0], reverse=True):
-            sequence, length, crc = self._header(slot)
-            if sequence == 0 or length > self.capacity:
-                continue
-            body = self._offset(slot) + _SLOT.size
-            data = self._map[body : body + length]
-            if crc32(data, sequence & 0xFFFFFFFF) == crc:
-                return sequence, data
+        # a writer may overtake a slow reader in both slots: then look again
+        for _ in range(_ATTEMPTS):
+            for slot in sorted((0, 1), key=lambda s: self._header(s)[0], reverse=True):
+                sequence, length, crc = self._header(slot)
+                if sequence == 0 or length > self.capacity:
+                    continue
+                body = self._offset(slot) + _SLOT.size
+                data = self._map[body : body + length]
+                if _crc(sequence, data) == crc:
+                    return sequence, data
         return None
 
     def close(self) -> None:

@@ -150,7 +150,8 @@ class Guard:
             playback = record.playback
             travel = 0.0 if playback is None else playback.remaining + playback.newest.way_home
             self._allow(2.0 * (travel + self.config.patience.lowering), now_ns)
-        elif state in (State.PARKED, State.OFFLINE):
+        elif state in (State.PARKED, State.OFFLINE, State.SAFE):
+            # a device that stopped by itself plays nothing: what follows begins where it stands
             record.playback = None
             self.supervisor.device.forgive()
 
@@ -165,7 +166,7 @@ class Guard:
             self.supervisor.inconsistent = f"cannot stand here: {accepted}"
             record.note(now_ns, self.supervisor.inconsistent)
         else:
-            record.playback = Playback(accepted)
+            record.playback = Playback(accepted, accepted.plan.duration)
         self.supervisor.device.forgive()
 
     def _start_from_measured(self, now_ns: int) -> None:
@@ -197,6 +198,7 @@ class Guard:
         if not bool(inside.all()):
             # cannot happen on an accepted plan: if it does, stand where the platform was last sent
             self.supervisor.inconsistent = "an accepted plan led outside the stroke"
+            record.playback = None
             return self._last
         sent = Order.WAIT if self.config.dry_run else order
         setpoint = Setpoint(sent, state, frozen(legs[0]))

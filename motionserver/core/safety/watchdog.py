@@ -122,12 +122,14 @@ class DeviceWatch:
         self._late = max(patience.feedback, 6.0 * send_period)
         self._valid_since: int | None = None
         self._astray_since: int | None = None
+        self._excused: Feedback | None = None
+        self._excused_ns = 0
         self.newest: Feedback | None = None
         self.error = 0.0
 
     def answered(self, feedback: Feedback) -> None:
         """Take a decoded answer."""
-        if self._valid_since is None or self.age(feedback.arrival_ns) > self._late:
+        if self._valid_since is None or self.is_lost(feedback.arrival_ns):
             self._valid_since = feedback.arrival_ns
         self.newest = feedback
 
@@ -137,7 +139,14 @@ class DeviceWatch:
 
     def is_lost(self, now_ns: int) -> bool:
         """True if the device has been silent for too long."""
+        if self._excused is not None and self._excused is self.newest:
+            return (now_ns - self._excused_ns) / SECOND > self._late
         return self.age(now_ns) > self._late
+
+    def excuse(self, now_ns: int) -> None:
+        """The guard itself stood still, and a base answers what it is sent: wait anew, once."""
+        if self.newest is not None and self._excused is not self.newest:
+            self._excused, self._excused_ns = self.newest, now_ns
 
     def valid_for(self, now_ns: int) -> float:
         """How long answers have come without a break [s]."""

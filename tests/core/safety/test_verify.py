@@ -1,0 +1,320 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from machines import compact, science_fit
+from own_kinematics import lengths, quintic_poses, worst
+from proposals import goals
+
+from motionserver.core.axes import frozen
+from motionserver.core.kinematics.hexapod import conditioning, joint_angles, neutral_conditioning
+from motionserver.core.motion.moves import rest_to_rest
+from motionserver.core.plan import Plan, rest_at
+from motionserver.core.safety.shape import continues, well_formed
+from motionserver.core.safety.verdict import Reason, Rejection
+from motionserver.core.safety.verify import (
+    GUARD_MARGINS,
+    PLANNER_MARGINS,
+    Margins,
+    check_legs,
+    check_ways_home,
+    judge,
+)
+
+ZERO = np.zeros(6)
+STANDING = rest_at(ZERO)
+BARE = Margins(0.0, 1.0, 1.0, 0.0, 1.0)
+
+
+def table(count=5, **rows):
+    """A plan of ``count`` knots that stands still, with some tables replaced."""
+    still = {
+        "times": np.linspace(0.0, 1.0, count),
+        "pose": np.zeros((count, 6)),
+        "velocity": np.zeros((count, 6)),
+        "acceleration": np.zeros((count, 6)),
+    }
+    return Plan(1, 0, 0.1, **{k: frozen(rows.get(k, v)) for k, v in still.items()})
+
+
+def edited(field, row, value, count=5):
+    numbers = np.zeros((count, 6))
+    numbers[row, 4] = value
+    return table(count, **{field: numbers})
+
+
+def hop(goal, duration, start=ZERO):
+    return rest_to_rest(1, 0, 0.1, frozen(start), frozen(goal), duration)
+
+
+def reason(plan, machine=None, margins=GUARD_MARGINS, parent=STANDING, before=None, homes=None):
+    found = judge(machine or compact(), plan, parent, before, margins, homes)
+    return None if found is None else found.reason
+
+
+def test_standing_still_is_allowed():
+    assert reason(table()) is None
+    assert reason(table(2)) is None
+    assert reason(table(256, times=np.linspace(0, 4.0, 256))) is None
+
+
+@pytest.mark.parametrize("field", ["pose", "velocity", "acceleration"])
+@pytest.mark.parametrize("row", [0, 2, 4])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e5, -1e300])
+def test_what_is_no_number_is_refused(field, row, value):
+    assert reason(edited(field, row, value)) is Reason.NOT_FINITE
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("row", [0, 2, 4])
+def test_times_that_are_no_numbers(row, value):
+    times = np.linspace(0.0, 1.0, 5)
+    times[row] = value
+    assert reason(table(times=times)) is Reason.NOT_FINITE
+    assert reason(replace(table(), takeover=value)) is Reason.NOT_FINITE
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        [0.0, 0.25, 0.25, 0.5, 1.0],
+        [0.0, 0.5, 0.25, 0.75, 1.0],
+        [0.0, 0.25, 0.5, 1.0, 0.75],
+        [1e-9, 0.25, 0.5, 0.75, 1.0],
+        [-0.1, 0.25, 0.5, 0.75, 1.0],
+        [0.0, -0.25, 0.5, 0.75, 1.0],
+        [0.0, 0.0, 0.5, 0.75, 1.0],
+        [0.0, 0.00009, 0.5, 0.75, 1.0],
+        [0.0, 0.5, 0.5079, 0.75, 1.0],
+        [0.0, 1e308, -1e308, 0.75, 1.0],
+        [0.0, 1e308, 2.0, 1e308, 1.0],
+        [0.0, 1.0, 2.0, 3.0, 4.01],
+        [0.0, 1.0, 2.0, 3.0, 1e300],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 5.0, 3.0, 4.0],
+    ],
+)
+def test_times_out_of_order_are_malformed(times):
+    assert reason(table(times=times)) is Reason.MALFORMED
+
+
+@pytest.mark.parametrize(
+    "times", [[0.0, 0.0001, 0.0081, 0.0161, 4.0], [0.0, 0.008, 0.016, 0.024, 0.032]]
+)
+def test_the_closest_knots_allowed(times):
+    assert reason(table(times=times)) is None
+
+
+@pytest.mark.parametrize("count", [257, 1000])
+def test_too_many_knots(count):
+    times = np.arange(count) * 0.009
+    assert reason(table(count, times=times)) is Reason.MALFORMED
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_too_few_knots(count):
+    assert reason(table(count, times=np.zeros(count))) is Reason.MALFORMED
+
+
+@pytest.mark.parametrize("field", ["pose", "velocity", "acceleration"])
+@pytest.mark.parametrize("shape", [(5, 5), (4, 6), (6,), (5, 6, 1)])
+def test_tables_of_another_shape(field, shape):
+    assert reason(table(**{field: np.zeros(shape)})) is Reason.MALFORMED
+    assert reason(table(times=np.zeros((5, 1)))) is Reason.MALFORMED
+
+
+@pytest.mark.parametrize("field", ["velocity", "acceleration"])
+@pytest.mark.parametrize("value", [1.1e-9, -1.0, 9e3])
+def test_a_plan_that_does_not_end_at_rest(field, value):
+    assert reason(edited(field, -1, value)) is Reason.NOT_AT_REST
+    assert well_formed(edited(field, -1, 0.9e-9), 4.0) is None
+
+
+@pytest.mark.parametrize(
+    ("field", "tolerance"), [("pose", 1e-7), ("velocity", 1e-6), ("acceleration", 1e-4)]
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_jump_at_the_hand_over(field, tolerance, sign):
+    assert continues(edited(field, 0, sign * tolerance * 0.99), STANDING) is None
+    assert reason(edited(field, 0, sign * tolerance * 1.01)) is Reason.DISCONTINUOUS
+
+
+def test_a_spike_between_two_samples_is_seen():
+    """Knots closer than the samples could hide half a metre between them."""
+    times = [0.0, 1.0003, 1.001, 1.0017, 2.0]
+    assert reason(table(times=times, pose=np.eye(5, 6, -2) * 0.5)) is Reason.MALFORMED
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_what_passes_keeps_its_jerk_at_every_phase(seed):
+    """Knots at their closest, jerk that turns between the samples, scaled until it just passes."""
+    rng = np.random.default_rng(seed)
+    machine, dt, count = compact(), rng.uniform(0.008, 0.02), int(rng.integers(4, 20))
+    times = np.arange(count + 10) * dt
+    times[1:] -= rng.choice([0.0, dt - 0.0003, dt - 0.003])
+    shape = rng.normal(size=(3, count + 10, 6)) * (rng.random(6) < 0.5)
+    shape *= rng.choice([0.0, 1.0], (3, 1, 1))
+    shape[:, 0] = shape[:, count:] = 0.0
+    powers = [dt**3, dt**2, dt]
+
+    def scaled(size):
+        rows = (frozen(part * power * size) for part, power in zip(shape, powers, strict=True))
+        return Plan(1, 0, 0.1, frozen(times), *rows)
+
+    low, high = 0.0, 1e5
+    for _ in range(25):
+        middle = (low + high) / 2
+        passes = check_legs(machine, scaled(middle), STANDING, None, GUARD_MARGINS) is None
+        low, high = (middle, high) if passes else (low, middle)
+    for phase in rng.random(3):
+        instants = np.arange(0.0, times[-1], 0.002) + phase * 0.002
+        found = worst(machine, quintic_poses(scaled(low), instants), 0.002)
+        assert max(found.values()) <= 1.0, found
+
+
+def largest(plan, machine, order):
+    times = np.arange(0.0, plan.duration + 0.01, 0.002)
+    legs = lengths(machine, quintic_poses(plan, np.concatenate(([0, 0, 0], times))))
+    return np.abs(np.diff(legs, order, axis=0)).max() / 0.002**order
+
+
+@pytest.mark.parametrize(
+    ("order", "limit", "reason_", "share"),
+    [
+        (1, "leg_speed", Reason.LEG_SPEED, 0.995),
+        (2, "leg_acceleration", Reason.LEG_ACCELERATION, 0.995),
+        (3, "leg_jerk", Reason.LEG_JERK, 0.97),
+    ],
+)
+def test_legs_are_differenced(order, limit, reason_, share):
+    plan = hop(np.array([0.02, 0.01, 0.02, 0.0, 0.02, 0.0]), 0.7)
+    found = largest(plan, compact(), order)
+    loose = {"leg_speed": 1e3, "leg_acceleration": 1e4, "leg_jerk": None}
+    machine = replace(compact(), **loose)
+    assert reason(plan, machine) is None
+    # the finer look at jerk near its limit may find a little more
+    room = 1.06 if order == 3 else 1.0001
+    assert reason(plan, replace(machine, **{limit: found / share * room})) is None
+    rejection = judge(replace(machine, **{limit: found / share * 0.9999}), plan, STANDING, None)
+    assert rejection is not None
+    assert rejection.reason is reason_
+    assert rejection.value == pytest.approx(found, rel=0.06 if order == 3 else 1e-6)
+    assert rejection.value > rejection.allowed
+    assert rejection.leg in range(6)
+    assert 0.0 <= rejection.when <= plan.duration + 0.01
+    assert str(rejection).startswith(f"plan rejected: {reason_}, leg {rejection.leg + 1}, at 0.")
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_stroke_has_two_ends(sign):
+    machine = compact()
+    goal = np.array([0.0, 0.0, sign * 0.1, 0.0, 0.0, 0.0])
+    plan = hop(goal, 3.0)
+    legs = lengths(machine, goal)[0]
+    name, end = ("leg_max", legs.max()) if sign > 0 else ("leg_min", legs.min())
+    homes = np.zeros((1, 6))
+    inside = replace(machine, **{name: end + sign * 0.0002001})
+    assert reason(plan, inside, homes=homes) is None
+    outside = judge(replace(machine, **{name: end + sign * 0.0001999}), plan, STANDING, None)
+    assert outside.reason is Reason.LEG_LENGTH
+    assert (outside.value - outside.allowed) * sign > 0
+    assert reason(plan, inside, PLANNER_MARGINS, homes=homes) is Reason.LEG_LENGTH
+
+
+def test_joint_angle_and_conditioning_where_the_shipped_machine_has_them():
+    machine, found = compact(), goals(compact())
+    for aim, expected in (("swung", Reason.JOINT_ANGLE), ("singular", Reason.CONDITIONING)):
+        for goal in found[aim][:10]:
+            rejection = judge(machine, hop(goal, 4.0), STANDING, None)
+            assert rejection.reason is expected
+            assert 0.0 < rejection.when <= 4.01
+            loose = replace(machine, joint_angle=None, conditioning=None)
+            assert reason(hop(goal, 4.0), loose) in (None, Reason.NO_WAY_HOME)
+
+
+def test_joint_angle_has_a_margin_at_its_limit():
+    goal = np.array([0.05, 0.0, 0.0, 0.05, 0.0, 0.1])
+    swing = joint_angles(compact(), goal[None]).max()
+    for margins, kept in ((GUARD_MARGINS, 0.001), (PLANNER_MARGINS, 0.003)):
+        wide = replace(compact(), joint_angle=swing + kept + 1e-6)
+        assert reason(hop(goal, 2.0), wide, margins) is None
+        tight = replace(compact(), joint_angle=swing + kept - 1e-6)
+        assert reason(hop(goal, 2.0), tight, margins) is Reason.JOINT_ANGLE
+
+
+def test_conditioning_has_a_margin_at_its_limit():
+    goal = np.array([0.0, 0.0, -0.15, 0.0, 0.0, 0.0])
+    ratio = conditioning(compact(), goal[None])[0] / neutral_conditioning(compact())
+    homes = np.zeros((1, 6))
+    wide = replace(compact(), joint_angle=None, conditioning=ratio / 1.01 - 1e-6)
+    assert reason(hop(goal, 3.0), wide, homes=homes) is None
+    tight = replace(wide, conditioning=ratio / 1.01 + 1e-6)
+    assert reason(hop(goal, 3.0), tight, homes=homes) is Reason.CONDITIONING
+
+
+def test_passengers_are_not_thrown():
+    plan = hop(np.array([0.03, 0.04, 0.0, 0.0, 0.0, 0.0]), 0.5)
+    found = 0.05 * 5.7735 / 0.25
+    kind = replace(compact(), passenger_acceleration=found / 0.995 * 1.001)
+    assert reason(plan, kind) is None
+    rough = judge(replace(compact(), passenger_acceleration=found * 0.999), plan, STANDING, None)
+    assert rough.reason is Reason.PASSENGER
+    assert rough.value == pytest.approx(found, rel=1e-3)
+
+
+def test_poses_without_a_way_home():
+    stranded = goals(compact())["stranded"]
+    assert len(stranded) > 50
+    for goal in stranded[:20]:
+        plan = hop(goal, 4.0)
+        assert reason(plan, homes=np.zeros((1, 6))) is None
+        assert reason(plan) is Reason.NO_WAY_HOME
+
+
+def test_the_way_home_is_judged_by_all_rules():
+    machine, goal = compact(), np.array([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
+    homes = np.stack((ZERO, machine.parked_pose))
+    assert check_ways_home(machine, goal, homes, GUARD_MARGINS) is None
+    # the swing is largest at the far end, the parked pose, which few samples would miss
+    swing = joint_angles(machine, machine.parked_pose[None]).max()
+    tight = replace(machine, joint_angle=swing)
+    found = check_ways_home(tight, goal, homes, GUARD_MARGINS)
+    assert found.reason is Reason.NO_WAY_HOME
+    slow = replace(machine, pace=replace(machine.pace, speed=0.003))
+    found = check_ways_home(slow, goal, homes, GUARD_MARGINS)
+    assert found.reason is Reason.NO_WAY_HOME
+    assert found.value > found.allowed == 60.0
+
+
+@pytest.mark.parametrize("takeover", [0.003, 0.004, 0.0055, 0.02])
+def test_samples_before_the_hand_over_belong_to_parent_and_grandparent(takeover):
+    """A motion cut into three plans passes as the whole does, with no step at its seams."""
+    machine = compact()
+    whole = replace(hop(np.array([0.03, 0.0, 0.03, 0.0, 0.05, 0.0]), 0.8), takeover=0.0)
+
+    def rest_of(plan, at, own):
+        later = plan.times[plan.times > at + 1e-3]
+        rows = (frozen(part) for part in plan.evaluate(np.concatenate(([at], later))))
+        times = frozen(np.concatenate(([at], later)) - at)
+        return Plan(own, plan.plan_id, at, times, *rows)
+
+    second = rest_of(whole, 0.4, 2)
+    third = rest_of(second, takeover, 3)
+    assert judge(machine, second, whole, STANDING, BARE) is None
+    assert judge(machine, third, second, whole, BARE) is None
+    assert judge(machine, third, second, whole, replace(BARE, jerk_share=0.001)).reason
+
+
+def test_another_machine_is_judged_by_its_own_limits():
+    plan = hop(np.array([0.0, 0.0, 0.15, 0.0, 0.0, 0.0]), 3.0)
+    assert reason(plan, science_fit()) is None
+    assert reason(plan, replace(science_fit(), leg_max=0.85)) is Reason.LEG_LENGTH
+
+
+def test_a_rejection_speaks():
+    assert str(Rejection(Reason.WRONG_PARENT)) == "plan rejected: wrong-parent"
+    text = str(Rejection(Reason.LEG_SPEED, 0.5, 2, 0.7, 0.6))
+    assert text == "plan rejected: leg-speed, leg 3, at 0.500 s, found 0.7, allowed 0.6"
+    assert str(Rejection(Reason.MALFORMED, value=3.0)) == "plan rejected: malformed"
