@@ -21,20 +21,25 @@ GUARD_PRIORITY: Final = 50
 PLANNER_PRIORITY: Final = 30
 
 
-def bench_loop(seconds: float, rates_hz: Sequence[float] = RATES_HZ) -> list[Row]:
+def bench_loop(
+    seconds: float,
+    rates_hz: Sequence[float] = RATES_HZ,
+    realtime: Sequence[bool] = (False, True),
+) -> list[Row]:
     """Measure lateness: every rate, without and with SCHED_FIFO, idle and under load.
 
     Args:
         seconds: Length of each of the four stretches per rate [s].
         rates_hz: Packets per second of the platform.
+        realtime: Whether the processes ask for SCHED_FIFO: without, with, or both in turn.
 
     Raises:
         BenchError: The server did not run.
     """
     rows: list[Row] = []
     for rate_hz in rates_hz:
-        for realtime in (False, True):
-            with BenchServer(rate_hz, realtime) as server, server.replay(RECORDING):
+        for asked in realtime:
+            with BenchServer(rate_hz, asked) as server, server.replay(RECORDING):
                 server.engage()
                 for loaded in (False, True):
                     rows += measure_stretch(server, seconds, loaded)
