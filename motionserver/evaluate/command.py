@@ -35,6 +35,7 @@ def evaluate(
     *,
     tuning: Tuning | None = None,
     planner_hz: float = PLANNER_HZ,
+    preview: float = 0.0,
     jobs: int = 2,
     quiet: bool = False,
 ) -> EvaluateResult:
@@ -53,6 +54,8 @@ def evaluate(
         html_out: File for the page.
         tuning: Other tunables; the defaults if None.
         planner_hz: Planner rate [Hz].
+        preview: How far the algorithms (not the rivals) are told the recording ahead [s]; 0 as in
+            life without a simulator that knows. The upper bound of what prediction can bring.
         jobs: Processes for the yardstick's search; the result does not depend on it.
         quiet: True for no progress.
 
@@ -74,7 +77,7 @@ def evaluate(
             print(f"{recording.name}: {text}", file=sys.stderr, flush=True)  # noqa: T201
 
     drives = [
-        _timed(machine, recording, replace(base, algorithm=name), rate, planner_hz, tell)
+        _timed(machine, recording, replace(base, algorithm=name), rate, planner_hz, preview, tell)
         for name in algorithms
     ]
     if setpoints is not None:
@@ -89,6 +92,7 @@ def evaluate(
         base,
         rate,
         planner_hz,
+        preview,
         tuple(drives),
         tuple(figures_of(driven) for driven in drives),
         yardstick,
@@ -106,10 +110,11 @@ def _timed(
     tuning: Tuning,
     rate: float,
     planner_hz: float,
+    preview: float,
     tell: Callable[[str], None],
 ) -> Drive:
     begun = perf_counter()
-    driven = drive(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+    driven = drive(machine, recording, tuning, rate=rate, planner_hz=planner_hz, preview=preview)
     took = perf_counter() - begun
     tell(f"{tuning.algorithm}: {recording.duration:.1f} s driven in {took:.1f} s")
     return driven

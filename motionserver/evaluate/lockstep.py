@@ -18,7 +18,7 @@ from motionserver.core.limits import Machine
 from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.safety.accept import accept_proposal, accept_rest
 from motionserver.core.safety.verdict import AcceptedPlan, Rejection
-from motionserver.core.state import VehicleMotion
+from motionserver.core.state import Preview, VehicleMotion
 from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.drive import RATE_HZ, Drive, Periods, assemble
@@ -26,6 +26,8 @@ from motionserver.evaluate.recording import Recording
 
 PLANNER_HZ: Final = 100.0
 """Planner rate unless told otherwise [Hz]."""
+PREVIEW_STEP: Final = 0.05
+"""Spacing of a preview's samples [s]."""
 Progress = Callable[[float], None]
 
 
@@ -67,6 +69,7 @@ def drive(
     rate: float = RATE_HZ,
     planner_hz: float = PLANNER_HZ,
     vehicle_head: Array | None = None,
+    preview: float = 0.0,
     thinker: Thinker | None = None,
     progress: Progress | None = None,
 ) -> Drive:
@@ -82,6 +85,8 @@ def drive(
         rate: Rate of the executed samples [Hz].
         planner_hz: Planner rate [Hz].
         vehicle_head: Driver's head from the recorded point, vehicle axes, (3,) [m]; zero if None.
+        preview: How far the recording itself is told ahead, as by a simulator that knows what
+            comes [s]; 0 for none.
         thinker: Another planner than that of ``tuning``.
         progress: Called about once per second of the drive with the share done, 0..1.
 
@@ -109,7 +114,7 @@ def drive(
         start, end = number / planner_hz, (number + 1) / planner_hz
         playback, now = advance(playback, start - now), start
         now_ns = round(start * SECOND_NS)
-        given = _hear(recording, given, start, gate, intake, log)
+        given = _hear(recording, given, start, preview, gate, intake, log)
         wanted = intake.stimulus(head, period, not gate.freshness.is_stale(now_ns))
 
         before = perf_counter()
@@ -167,7 +172,13 @@ def _standing(machine: Machine, homes: Array) -> AcceptedPlan:
 
 
 def _hear(
-    recording: Recording, given: int, now: float, gate: Gate, intake: Intake, log: _Log
+    recording: Recording,
+    given: int,
+    now: float,
+    preview: float,
+    gate: Gate,
+    intake: Intake,
+    log: _Log,
 ) -> int:
     """Offer every sample that has arrived by ``now`` [s]; return how many are given."""
     while given < len(recording.times) and recording.times[given] <= now + 1e-9:
@@ -180,6 +191,7 @@ def _hear(
             recording.force[given],
             recording.rates[given],
             float(recording.speed[given]),
+            preview=_preview(recording, given, preview) if preview > 0.0 else None,
         )
         refusal = gate.refuse("recording", recording.name, motion)
         if refusal is None:
@@ -188,3 +200,17 @@ def _hear(
             log.gate[refusal] += 1
         given += 1
     return given
+
+
+def _preview(recording: Recording, given: int, seconds: float) -> Preview | None:
+    """What the recording holds after sample ``given``, as far as it goes."""
+    now = recording.times[given]
+    ahead = now + np.arange(1, int(seconds / PREVIEW_STEP) + 1) * PREVIEW_STEP
+    ahead = ahead[ahead <= recording.times[-1] + 1e-9]
+    if len(ahead) == 0:
+        return None
+    columns = [
+        np.interp(ahead, recording.times, c) for c in (*recording.force.T, *recording.rates.T)
+    ]
+    both = np.column_stack(columns)
+    return Preview(frozen(ahead - now), frozen(both[:, :3]), frozen(both[:, 3:]))

@@ -45,6 +45,11 @@ def remarks(result: EvaluateResult) -> list[str]:
         "the guard's check"
         + (": as it must be" if result.violations + result.rejected == 0 else "")
     ]
+    if result.preview > 0.0:
+        out.append(
+            f"the algorithms were told {result.preview:g} s ahead, the rivals nothing: an upper "
+            "bound, not what a simulator without preview gets"
+        )
     yard, still = result.of("yardstick"), result.of("no motion")
     for figures in result.figures:
         planning = figures.planning

@@ -26,6 +26,7 @@ class EvaluateResult:
         tuning: Scale and tunables; its algorithm says nothing.
         rate: Of the executed samples [Hz].
         planner_hz: Planner rate [Hz].
+        preview: How far the algorithms were told the recording ahead [s].
         drives: Algorithms as asked for, then the yardstick, then no motion.
         figures: Of the drives, in the same order.
         yardstick: How it was found.
@@ -36,6 +37,7 @@ class EvaluateResult:
     tuning: Tuning
     rate: float
     planner_hz: float
+    preview: float
     drives: tuple[Drive, ...]
     figures: tuple[Figures, ...]
     yardstick: Yardstick
@@ -78,6 +80,7 @@ def to_mapping(result: EvaluateResult) -> dict[str, object]:
         "scale": result.tuning.scale,
         "rate_hz": result.rate,
         "planner_hz": result.planner_hz,
+        "preview_s": result.preview,
         "tuning": tuning,
         "yardstick": {
             "rule": RULE,
