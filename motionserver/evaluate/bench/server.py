@@ -18,7 +18,7 @@ from motionserver.evaluate.bench.processes import BenchError, Helper, free_port,
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.requests import RequestError, ask
 
-RAISING: Final = 60.0
+RAISING: Final = 30.0
 """Longest wait for the platform to run [s]."""
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
