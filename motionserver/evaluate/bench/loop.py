@@ -58,7 +58,7 @@ def measure_stretch(server: BenchServer, seconds: float, loaded: bool) -> list[R
         loaded: Whether the page is asked as fast as it answers meanwhile.
     """
     tick_hz = server.guard()["rates_hz"]["tick"]
-    plan_hz = server.planner()["rates_hz"]["planner"] or 60.0
+    plan_hz = server.plan_hz
     priorities = (GUARD_PRIORITY, PLANNER_PRIORITY) if server.realtime else (0, 0)
     kind = f"{'FIFO' if server.realtime else 'plain'} {'load' if loaded else 'idle'}"
     pressed: dict[str, Any] = {}

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 import time
 from contextlib import ExitStack
+from math import ceil
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -23,6 +24,7 @@ RAISING: Final = 30.0
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
 
+FASTEST_PLANNER_HZ: Final = 120.0
 OTHERS_PRIORITY: Final = 20
 """For SCHED_FIFO of base and simulator, if permitted: they have computers of their own."""
 
@@ -35,6 +37,7 @@ class BenchServer:
         realtime: Whether its processes ask for SCHED_FIFO.
 
     Attributes:
+        plan_hz: Plans per second that are due at this rate [Hz].
         cue_port: UDP port of the cue.
         web_port: TCP port of the page.
         base_log: What the base received, with instants.
@@ -43,6 +46,7 @@ class BenchServer:
 
     def __init__(self, rate_hz: float, realtime: bool) -> None:
         self.rate_hz, self.realtime = rate_hz, realtime
+        self.plan_hz = rate_hz / ceil(rate_hz / FASTEST_PLANNER_HZ)
         self.cue_port = free_port(socket.SOCK_DGRAM)
         self.web_port = free_port(socket.SOCK_STREAM)
         self.verdict: dict[str, Any] = {}
@@ -163,5 +167,6 @@ class BenchServer:
             },
             "platform": {"port": base_port, "local_port": 0, "rate_hz": float(self.rate_hz)},
             "sources": [{"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}],
+            "cueing": {"rate_max_hz": FASTEST_PLANNER_HZ},
             "web": {"port": self.web_port},
         }
