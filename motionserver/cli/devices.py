@@ -15,7 +15,10 @@ from motion_clients.replay import replay as send_recording
 
 from motionserver.errors import ConfigError
 from motionserver.settings.config import split_address
+from motionserver.telemetry.realtime import take_priority
 
+PUNCTUAL = 20
+"""Real-time priority to ask for: a base and a simulator are punctual, an emulated one must be."""
 EMULATORS = ("moog-6dof2000e",)
 
 
@@ -36,10 +39,11 @@ def emulate(
     seed: int,
     cut_after: float | None,
 ) -> dict[str, object]:
-    """Be a device until a signal; returns the judge's verdict."""
+    """Be a device until a signal, as punctual as permitted; returns the judge's verdict."""
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)
+    take_priority(PUNCTUAL, wanted=True)
     cut = LinkFlaws()
     if cut_after is not None:
         begin = time.monotonic() + cut_after
@@ -66,6 +70,7 @@ def replay(recording: str, to: str, form: str, loop: bool, preview: float) -> st
         raise ConfigError("--format", f"unknown {form!r}", f"Allowed: {', '.join(FORMATS)}.")
     path = recording_path(recording) if recording in recording_names() else Path(recording)
     host, port = _address("--to", to)
+    take_priority(PUNCTUAL, wanted=True)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

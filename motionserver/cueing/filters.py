@@ -74,8 +74,8 @@ FILTER_SETS: Final = {
     ),
     "standard": FilterSet(
         "standard",
-        high=Corner(2.5, 1.0, 0.04),
-        low=Corner(1.0, 1.0, 0.06),
+        high=Corner(2.1, 0.5, 0.045),
+        low=Corner(9.0, 1.3, 0.04),
         heave=Corner(3.5, 1.0, 0.04),
         yaw=Corner(1.0, 1.0, 0.05),
         rotation=0.5,

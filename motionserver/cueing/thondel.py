@@ -125,11 +125,13 @@ class Thondel:
         """Solve for the inputs and lay out the filters' answer; see `Cueing.propose`."""
         self._pending = None
         if not (np.isfinite(stimulus.force).all() and np.isfinite(stimulus.rates).all()):
-            return self._no_candidate("not finite", 0)
+            self._say("not finite", 0)
+            return None
         wanted = self._reference.predict(stimulus)
         wanted[:, 5] = self._onset_of_yaw(wanted[:, 5], float(stimulus.rates[2]))
         if not np.isfinite(wanted).all():
-            return self._no_candidate("not finite", 0)
+            self._say("not finite", 0)
+            return None
         rates = self._to_pieces @ wanted[:, 3:] * self._tuning.rotation_gain
         # yaw is a channel of its own here
         rates[:, 2] = 0.0
@@ -151,7 +153,8 @@ class Thondel:
             self._halving.x_max,
         )
         if not self._usable(result):
-            return self._no_candidate(str(result.status), result.iterations)
+            self._say(str(result.status), result.iterations)
+            return None
         inputs = result.x[: self._programme.layout.inputs]
         tables = np.concatenate(
             (np.zeros((3, 1, 6)), self._plant.phi @ state + self._plant.gamma @ inputs), axis=1
@@ -171,7 +174,7 @@ class Thondel:
         cut_short = result.status is QpStatus.BUDGET and self._tuning.backend != "daqp"
         return (result.status is QpStatus.SOLVED or cut_short) and bool(np.isfinite(result.x).all())
 
-    def _no_candidate(self, status: str, iterations: int) -> None:
+    def _say(self, status: str, iterations: int) -> None:
         self._report = replace(self._report, solver_status=status, iterations=iterations)
 
     def _onset_of_yaw(self, rate: Array, now: float) -> Array:

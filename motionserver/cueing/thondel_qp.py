@@ -93,6 +93,7 @@ class Programme:
         q[: layout.inputs] = self._cost.linear(state, aim, input_aim, last)
         free = self._plant.node_phi @ state + turned
         rates = 1.0 - self._rows.state @ state
+        matrices: QpMatrices | None
         if self._constant is None:
             matrices, limits = self._with_legs(free, nominal, x_max)
             upper = np.concatenate((rates, limits))

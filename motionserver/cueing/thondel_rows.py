@@ -19,7 +19,7 @@ from motionserver.cueing.tuning import Tuning
 LARGEST_INPUT: Final = 8.0
 """|U| of every channel [m/s2, rad/s2]."""
 TILT_AXES: Final = (Axis.PITCH, Axis.ROLL)
-RATE_PENALTY: Final = (10.0, 10.0)
+RATE_PENALTY: Final = (20.0, 20.0)
 """Linear and quadratic penalty of tilt rate beyond its threshold, per piece, as a share of it."""
 BOX_PENALTY: Final = (200.0, 200.0)
 """Of leaving the box, as a share of it."""

@@ -52,9 +52,9 @@ class Tuning:
     )
     horizon: float = 2.0
     weight_force: float = 1.0
-    weight_input: float = 0.02
+    weight_input: float = 0.2
     weight_change: float = 0.02
-    weight_position: float = 0.5
+    weight_position: float = 2.8
     filters: str = "standard"
     reference: str = "constant"
     legs: bool = True

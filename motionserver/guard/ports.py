@@ -87,7 +87,12 @@ class Ports:
             self._counters["plans_rejected"] += 1
             return None
 
-    def publish(self, now: int, due: int, record: GuardRecord) -> None:
+    def has_news(self, record: GuardRecord) -> bool:
+        """True if a plan was accepted that the planner does not know of yet."""
+        playback = record.playback
+        return playback is not None and playback.newest.plan.plan_id != self._accepted_id
+
+    def publish(self, sent: int, now: int, due: int, record: GuardRecord) -> None:
         """Tell the planner what is accepted, before the packet goes out."""
         playback = record.playback
         newest = None if playback is None else playback.newest.plan
@@ -99,7 +104,7 @@ class Ports:
                 STATES.index(record.state),
                 0 if newest is None else newest.plan_id,
                 0.0 if playback is None else playback.newest_clock,
-                now,
+                sent,
                 due,
                 now,
             ).pack()
@@ -114,8 +119,11 @@ class Ports:
             self._counters["send_errors"] += 1
 
     def show(self, snapshot: bytes) -> None:
-        """Publish the snapshot for the page."""
-        self._maps.guard.write(snapshot)
+        """Publish the snapshot for the page; one that is too long is counted."""
+        try:
+            self._maps.guard.write(snapshot)
+        except ValueError:
+            self._counters["snapshots_too_long"] += 1
 
 
 def open_link(descriptor: int) -> socket.socket:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def snapshot(
     guard: Guard,
     options: GuardOptions,
     setpoint: Setpoint,
-    ticks: dict[str, object],
+    ticks: Mapping[str, object],
     rates: dict[str, float],
     now_ns: int,
 ) -> bytes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from motionserver.core.intake.gate import Gate
@@ -18,6 +18,8 @@ from motionserver.sources.zenoh_input import ZenohInput
 
 log = logging.getLogger("motionserver.planner")
 SHOWN_ERRORS = 5
+MOST_SENDERS = 8
+"""Senders per input whose format is remembered; more are strangers, and start anew."""
 
 
 class Transport(Protocol):
@@ -38,16 +40,28 @@ class Transport(Protocol):
 
 @dataclass(slots=True)
 class Input:
-    """One source: transport, decoder, name."""
+    """One source: transport, a decoder for each sender, name."""
 
     options: InputOptions
     transport: Transport
-    format: SourceFormat
+    formats: dict[str, SourceFormat] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """How it is shown."""
         return f"{self.options.kind} {self.options.host}:{self.options.port}"
+
+    def decode(self, data: bytes, address: str, arrival_ns: int) -> VehicleMotion:
+        """Read a datagram; what a format remembers of a sender, another sender cannot touch.
+
+        Raises:
+            SourceError: The bytes are no sample.
+        """
+        if address not in self.formats:
+            while len(self.formats) >= MOST_SENDERS:
+                del self.formats[next(iter(self.formats))]
+            self.formats[address] = make_source(self.options.kind, self.options.key)
+        return self.formats[address].decode(data, arrival_ns)
 
 
 def open_input(options: InputOptions) -> Input:
@@ -57,13 +71,14 @@ def open_input(options: InputOptions) -> Input:
         OSError: The address cannot be bound.
         ConfigError: The kind is unknown.
     """
+    make_source(options.kind, options.key)
     transport: Transport
     if options.kind == "zenoh":
         endpoint = f"tcp/{options.host}:{options.port}"
         transport = ZenohInput(options.topic, [endpoint], list(options.connect))
     else:
         transport = UdpInput(options.host, options.port)
-    return Input(options, transport, make_source(options.kind, options.key))
+    return Input(options, transport)
 
 
 class Inputs:
@@ -89,9 +104,13 @@ class Inputs:
             for data, address, arrival_ns in source.transport.drain():
                 self.counters["packets"] += 1
                 try:
-                    motion = source.format.decode(data, arrival_ns)
+                    motion = source.decode(data, address, arrival_ns)
                 except SourceError as error:
                     self._refused(error.reason, f"{source.name} from {address}: {error}")
+                    continue
+                except Exception as error:
+                    # a third party's format that stumbles costs its packet, not the period
+                    self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")
                     continue
                 wants_sensor = source.options.kind == "imu"
                 if wants_sensor and not motion.at_platform:

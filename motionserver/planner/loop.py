@@ -28,6 +28,7 @@ from motionserver.planner.options import PlannerOptions
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.link import STATES, Maps, pack_cue
+from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Ticker, now_ns
@@ -60,6 +61,7 @@ class PlannerLoop:
         self._measured_ns = 0
         self._timing = Timing(int(options.period * SECOND))
         self._view = PlannerView()
+        self._seldom = Seldom(log)
         self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None
@@ -96,7 +98,7 @@ class PlannerLoop:
             self._step(woken)
         except Exception:
             self._inputs.counters["tick_errors"] += 1
-            log.exception("period failed; the accepted plan plays on")
+            self._seldom.exception(woken, "period failed; the accepted plan plays on")
         self._arm(now_ns())
 
     def _arm(self, now: int) -> None:

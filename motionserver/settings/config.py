@@ -189,8 +189,9 @@ def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     out = dict(base)
     for key, value in over.items():
         below = out.get(key)
-        nested = isinstance(below, dict) and isinstance(value, Mapping)
-        out[key] = _merged(below, value) if nested else value
+        if isinstance(below, dict) and isinstance(value, Mapping):
+            value = _merged(below, value)
+        out[key] = value
     return out
 
 

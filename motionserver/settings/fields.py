@@ -11,6 +11,8 @@ from pydantic import Field
 from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 
+from motionserver.errors import MotionServerError
+
 BUILT_IN_ALGORITHMS: Final = ("thondel2014", "classical")
 
 
@@ -40,7 +42,7 @@ class FieldError:
         }
 
 
-class TuningError(ValueError):
+class TuningError(MotionServerError):
     """Values that cannot be taken; nothing was changed.
 
     Attributes:

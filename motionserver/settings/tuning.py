@@ -51,8 +51,8 @@ def _box(axis: str, default: float, high: float, unit: str) -> Any:  # noqa: ANN
         unit,
         group="Workspace",
         label=axis.capitalize(),
-        meaning=f"Largest {axis} either way that cueing may use; at most the machine's own.",
-        more=f"stronger cues, less {axis} left in reserve",
+        meaning=f"Largest {axis} either way that cueing may use.",
+        more="stronger cues, less reserve",
     )
 
 

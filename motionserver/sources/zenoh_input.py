@@ -47,12 +47,15 @@ class ZenohInput:
         """Open the session and subscribe.
 
         Raises:
-            zenoh.ZError: The endpoint cannot be opened.
+            OSError: An endpoint or the key cannot be used.
         """
         self._slot: deque[tuple[bytes, str, int]] = deque(maxlen=DEPTH)
         self._topic = topic
-        self._session = zenoh.open(zenoh_config(listen, connect))
-        self._subscriber = self._session.declare_subscriber(topic, self._take)
+        try:
+            self._session = zenoh.open(zenoh_config(listen, connect))
+            self._subscriber = self._session.declare_subscriber(topic, self._take)
+        except zenoh.ZError as error:
+            raise OSError(f"zenoh on {', '.join(listen)}, key {topic!r}: {error}") from error
 
     def _take(self, sample: zenoh.Sample) -> None:
         self._slot.append(
@@ -61,10 +64,8 @@ class ZenohInput:
 
     def drain(self) -> list[tuple[bytes, str, int]]:
         """Samples that wait: bytes, key as text, arrival [ns]."""
-        out: list[tuple[bytes, str, int]] = []
-        while self._slot:
-            out.append(self._slot.popleft())
-        return out
+        # the callback goes on storing meanwhile: take what is there now, no more
+        return [self._slot.popleft() for _ in range(len(self._slot))]
 
     def reply(self, name: str, data: bytes) -> None:
         """Publish the status beside the cue, on .../status."""

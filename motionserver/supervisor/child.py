@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+from motionserver.telemetry.parent import PARENT
+
 QUICK: Final = 5.0
 """A child that lived shorter than this is started again more slowly [s]."""
 SLOWEST: Final = 2.0
@@ -58,14 +60,17 @@ class Child:
             self.exits.append(status)
             quick = time.monotonic() - began < QUICK
             pause = min(SLOWEST, max(0.1, 2.0 * pause)) if quick else 0.0
-            if not self.wanted:
-                break
-            self.restarts += 1
-            log.warning("%s ended with %s; starting it again", self.name, status)
-            if self.restarts > 1 and pause:
-                await asyncio.sleep(pause)
-            while self.wanted and not self.may_start():
-                await asyncio.sleep(0.05)
+            await self._wait_to_restart(status, pause)
+
+    async def _wait_to_restart(self, status: int, pause: float) -> None:
+        if not self.wanted:
+            return
+        self.restarts += 1
+        log.warning("%s ended with %s; starting it again", self.name, status)
+        if self.restarts > 1 and pause:
+            await asyncio.sleep(pause)
+        while self.wanted and not self.may_start():  # noqa: ASYNC110  (another process decides)
+            await asyncio.sleep(0.05)
 
     async def ended(self, patience: float) -> int:
         """Wait for its end, at most ``patience`` [s]; its exit status, 0 if it never lived.
@@ -78,7 +83,7 @@ class Child:
 
     async def start(self, *more: str) -> asyncio.subprocess.Process:
         """Start it once, with ``more`` arguments behind its own."""
-        environment = dict(os.environ)
+        environment = {**os.environ, PARENT: str(os.getpid())}
         # one thread per process: a solver that spreads over the cores disturbs the guard
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
@@ -89,6 +94,8 @@ class Child:
             pass_fds=self.descriptors,
             env=environment,
             stdin=asyncio.subprocess.DEVNULL,
+            # Ctrl-C is the supervisor's: it parks first, then tells the others
+            process_group=0,
         )
         self._process = process
         return process

@@ -9,18 +9,25 @@ import json
 import logging
 import os
 import signal
-import socket
 from pathlib import Path
 from typing import Any, Final, TextIO
 
 from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
+from motionserver.supervisor.addresses import open_link, try_addresses
 from motionserver.supervisor.child import Child
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
 """Longest wait for the guard to park when the service ends [s]."""
+LEFT: Final = (
+    *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
+    *("config.json", "web.json", "tuning.json"),
+)
+"""What a run leaves in its directory, but for the locks."""
+LONGEST_PATH: Final = 70
+"""Longest run directory [bytes]: a unix socket's path has 108 at most."""
 
 log = logging.getLogger("motionserver.supervisor")
 
@@ -44,15 +51,16 @@ class Service:
         """
         self.run_dir = run_dir
         self._lock = self._take(run_dir)
-        self._link = _open_link(local)
+        self._link = open_link(local)
+        try_addresses(resolved["sources"], resolved["web"] if config_web else None)
         self.local_port: int = self._link.getsockname()[1]
         web = dict(resolved["web"])
         core = {key: value for key, value in resolved.items() if key != "web"}
-        (run_dir / "config.json").write_text(json.dumps(core), "utf-8")
-        (run_dir / "web.json").write_text(json.dumps(web), "utf-8")
-        (run_dir / "tuning.json").unlink(missing_ok=True)
-        for stale in run_dir.glob("*.map"):
-            stale.unlink()
+        self._clean()
+        for name, content in (("config.json", core), ("web.json", web)):
+            # keys of signed sources are in it
+            (run_dir / name).touch(mode=0o600)
+            (run_dir / name).write_text(json.dumps(content), "utf-8")
         self._maps = Maps(run_dir, create=True)
         descriptor = self._link.fileno()
         guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
@@ -66,22 +74,33 @@ class Service:
 
     @staticmethod
     def _take(run_dir: Path) -> TextIO:
-        run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
-        if run_dir.stat().st_uid != os.getuid():
-            raise ConfigError(
-                "[server] run_dir", f"{run_dir} belongs to somebody else", "Choose another folder."
-            )
-        run_dir.chmod(0o700)
-        lock = (run_dir / "service.lock").open("w")
+        where, other = "[server] run_dir", "Choose another folder."
+        if len(os.fsencode(run_dir.absolute())) > LONGEST_PATH:
+            raise ConfigError(where, f"{run_dir} is too long a path for sockets", other)
+        try:
+            run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if run_dir.stat().st_uid != os.getuid():
+                raise ConfigError(where, f"{run_dir} belongs to somebody else", other)
+            run_dir.chmod(0o700)
+            lock = (run_dir / "service.lock").open("w")
+        except OSError as error:
+            raise ConfigError(where, f"{run_dir}: {error.strerror}", other) from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
+            lock.close()
             raise ConfigError(
-                "[server] run_dir",
+                where,
                 f"another server runs in {run_dir}",
                 "Stop it first: one platform has one server.",
             ) from error
         return lock
+
+    def _clean(self) -> None:
+        """Nothing of this or an earlier run may be taken for a living server."""
+        for pattern in LEFT:
+            for stale in self.run_dir.glob(pattern):
+                stale.unlink(missing_ok=True)
 
     def leave(self) -> None:
         """End softly: park, then stop everything."""
@@ -110,28 +129,32 @@ class Service:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
         self._link.close()
+        self._clean()
         self._lock.close()
         return self.exit_status
 
     async def _park(self) -> int:
-        """Let the active guard park; the spare goes first, it has nothing to do."""
+        """Let the active guard park; the spare is told too, and parks if its turn comes."""
         active, spare = self._active()
-        active.wanted = spare.wanted = False
-        await spare.end(signal.SIGKILL, 1.0)
+        for guard in (active, spare):
+            guard.wanted = False
+            guard.signal(signal.SIGTERM)
         deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
-        active.signal(signal.SIGTERM)
+        result = 3
         while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
             try:
                 status = await active.ended(left)
             except TimeoutError:
                 break
             if status in (0, 3):
-                return status
-            # it was killed while parking: its successor must park too
-            log.warning("%s ended with %s while parking; starting it again", active.name, status)
-            await active.start("leave")
-        await active.end(signal.SIGKILL, 1.0)
-        return 3
+                result = status
+                break
+            log.warning("%s ended with %s while parking; the other parks", active.name, status)
+            active, spare = spare, active
+            if active.pid is None:
+                await active.start("leave")
+        await asyncio.gather(*(guard.end(signal.SIGKILL, 1.0) for guard in (active, spare)))
+        return result
 
     def _is_not_cued(self) -> bool:
         """A planner that died is replaced once the platform parks: its successor knows nothing."""
@@ -167,20 +190,3 @@ class Service:
                 ).encode()
             )
             await asyncio.sleep(0.1)
-
-
-def _open_link(local: tuple[str, int]) -> socket.socket:
-    link = socket.socket(socket.AF_INET6 if ":" in local[0] else socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        link.bind(local)
-    except OSError as error:
-        link.close()
-        hint = "Choose another local_port, or stop the program that holds it."
-        if error.errno == 13:
-            hint = "Ports below 1024 need CAP_NET_BIND_SERVICE; or choose another local_port."
-        raise ConfigError(
-            "[platform] local_host, local_port",
-            f"{local[0]}:{local[1]} cannot be bound ({error.strerror})",
-            hint,
-        ) from error
-    return link

@@ -12,9 +12,10 @@ import ctypes
 import os
 import struct
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import Final
+
+from motionserver.telemetry.histogram import Histogram
 
 _CLOCK_MONOTONIC: Final = 1
 _NONBLOCK_CLOEXEC: Final = os.O_NONBLOCK | os.O_CLOEXEC
@@ -61,28 +62,50 @@ class Ticker:
 
 
 class Lateness:
-    """How late the last ticks were, and how many slots were lost."""
+    """How late ticks were, lately and since the start, and how many slots were lost.
 
-    def __init__(self, period_ns: int, keep: int = 2048) -> None:
+    Args:
+        period_ns: Time between two ticks [ns].
+        keep: "Lately" is the last ``keep`` to ``2 keep`` ticks.
+    """
+
+    def __init__(self, period_ns: int, keep: int = 1024) -> None:
         self._period_ns = period_ns
-        self._late: deque[int] = deque(maxlen=keep)
+        self._keep = keep
+        self._all, self._before, self._now = Histogram(), Histogram(), Histogram()
+        self._max_before = self._max_now = self._in_now = 0
         self.missed = 0
         self.ticks = 0
 
     def ticked(self, late_ns: int) -> None:
         """Note one tick; a whole period late is a lost slot."""
-        self._late.append(late_ns)
+        if self._in_now == self._keep:
+            self._before, self._max_before = self._now, self._max_now
+            self._now, self._max_now, self._in_now = Histogram(), 0, 0
+        self._all.add(late_ns)
+        self._now.add(late_ns)
+        self._in_now += 1
+        self._max_now = max(self._max_now, late_ns)
         self.ticks += 1
         self.missed += max(0, late_ns // self._period_ns)
 
-    def summary(self) -> dict[str, float]:
-        """Percentiles of the last ticks [ms] and lost slots since the start."""
-        late = sorted(self._late) or [0]
+    def summary(self) -> dict[str, float | dict[str, int]]:
+        """Percentiles [ms], lost slots, and the histogram behind them.
+
+        p50, p99 and the largest are of the last ticks; p99.9, ``ticks``, ``missed`` and
+        ``late_bins`` (see `Histogram.to_mapping`) are of all since the start, so that the figures
+        of any stretch are the difference of two summaries.
+        """
+        late = self._before.plus(self._now)
+        largest = max(self._max_before, self._max_now)
         return {
-            "late_p50_ms": late[len(late) // 2] / 1e6,
-            "late_p99_ms": late[min(len(late) - 1, int(len(late) * 0.99))] / 1e6,
-            "late_max_ms": late[-1] / 1e6,
+            "late_p50_ms": min(late.percentile(0.5), largest) / 1e6,
+            "late_p99_ms": min(late.percentile(0.99), largest) / 1e6,
+            "late_max_ms": largest / 1e6,
+            "late_p999_ms": self._all.percentile(0.999) / 1e6,
+            "ticks": self.ticks,
             "missed": self.missed,
+            "late_bins": self._all.to_mapping(),
         }
 
 

@@ -32,6 +32,7 @@ def build_app(
     config: WebConfig,
     guard: SnapshotSource,
     planner: SnapshotSource,
+    service: SnapshotSource,
     ask_guard: Ask,
     ask_planner: Ask,
 ) -> FastAPI:
@@ -41,6 +42,7 @@ def build_app(
         config: Configuration of this process.
         guard: Snapshots of the guard.
         planner: Snapshots of the planner.
+        service: Snapshots of the service that watches the processes.
         ask_guard: Sends a request to the guard.
         ask_planner: Sends a request to the planner.
 
@@ -48,7 +50,7 @@ def build_app(
         WebConfigError: The tokens file cannot be used.
     """
     app = FastAPI(title="motionserver", docs_url=None, redoc_url=None, openapi_url=None)
-    board = StatusBoard(guard, planner, config)
+    board = StatusBoard(guard, planner, service, config)
     answered: Counter[str] = Counter()
     desk = Desk(
         config,
@@ -105,8 +107,8 @@ def _motion_routes(app: FastAPI, desk: Desk) -> None:
         if refusal is not None:
             desk.audit.note(op, caller, "not by HTTP")
             raise Refusal(403, f"engaging by HTTP is not possible: {refusal}", path,
-                          "engage = http with a loopback bind or an enable input",
-                          "engage at the platform")  # fmt: skip
+                          "[operator] engage = http, with a loopback bind or an enable input",
+                          "engage at the console")  # fmt: skip
         answer = await desk.guard.ask({"op": op, "by": "http"}, path)
         result = "done" if answer.get("ok") else str(answer.get("reason"))
         desk.audit.note(op, caller, result, state=answer.get("state"))

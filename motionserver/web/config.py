@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 from motionserver.core.limits import Machine, machine_from_mapping
+from motionserver.errors import MotionServerError
 
 LOOPBACK_NAMES: Final = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
-class WebConfigError(ValueError):
+class WebConfigError(MotionServerError):
     """The page cannot be served like this; the text says what to change."""
 
 
@@ -70,7 +71,7 @@ class WebConfig:
     def engage_refusal(self) -> str | None:
         """Why engaging by HTTP is not possible here; None if it is."""
         if self.engage != "http":
-            return "the configuration allows engaging at the platform only (engage = local)"
+            return "the configuration does not allow it ([operator] engage is not http)"
         if not (self.is_loopback or self.enable_input):
             return "engaging from another computer needs a configured enable input"
         return None

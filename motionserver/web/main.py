@@ -11,6 +11,7 @@ from fastapi import FastAPI
 
 from motionserver.telemetry.parent import follow_parent
 from motionserver.web.config import WebConfig, WebConfigError, read_config
+from motionserver.web.connection import PatientProtocol
 from motionserver.web.wiring import wired_app
 
 _NICENESS = 10
@@ -25,7 +26,7 @@ def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
             port=config.port,
             ssl_certfile=config.tls_cert,
             ssl_keyfile=config.tls_key,
-            http="h11",
+            http=PatientProtocol,
             ws="none",
             lifespan="off",
             limit_concurrency=64,

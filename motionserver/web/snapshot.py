@@ -46,6 +46,7 @@ class StatusBoard:
     Args:
         guard: Snapshots of the guard.
         planner: Snapshots of the planner.
+        service: Who was started, from the service that watches the others.
         config: For the machine and the policy of engaging.
         now_ns: Clock, CLOCK_MONOTONIC [ns].
     """
@@ -54,11 +55,13 @@ class StatusBoard:
         self,
         guard: SnapshotSource,
         planner: SnapshotSource,
+        service: SnapshotSource,
         config: WebConfig,
         now_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._guard = guard
         self._planner = planner
+        self._service = service
         self._config = config
         self._now_ns = now_ns
         self._last: Status | None = None
@@ -73,7 +76,8 @@ class StatusBoard:
 
     def _compute(self, now: int) -> dict[str, Any]:
         guard, planner = _read(self._guard), _read(self._planner)
-        processes = {"guard": _process(guard, now), "planner": _process(planner, now)}
+        service = _read(self._service)
+        processes = _processes(guard, planner, service, now)
         alive = processes["guard"]["alive"]
         refusal = self._config.engage_refusal()
         return {
@@ -82,7 +86,7 @@ class StatusBoard:
             "reason": guard.get("reason", "") if alive else _silence("guard", processes["guard"]),
             "algorithm": planner.get("algorithm"),
             "x_max": planner.get("x_max"),
-            "processes": processes | {"web": {"pid": os.getpid(), "alive": True, "age_s": 0.0}},
+            "processes": processes,
             "counters": _merged(planner, guard, "counters"),
             "rates_hz": _merged(planner, guard, "rates_hz"),
             "engage": {"by_http": refusal is None, "why_not": refusal},
@@ -102,6 +106,26 @@ def _read(source: SnapshotSource) -> dict[str, Any]:
         return source.read() or {}
     except (OSError, ValueError):
         return {}
+
+
+def _processes(
+    guard: Mapping[str, Any], planner: Mapping[str, Any], service: Mapping[str, Any], now: int
+) -> dict[str, dict[str, Any]]:
+    """Who lives, by its own word; and the spare guard, by the service's."""
+    found = {
+        "guard": _process(guard, now),
+        "planner": _process(planner, now),
+        "web": {"pid": os.getpid(), "alive": True, "age_s": 0.0},
+    }
+    watching = _process(service, now)
+    if service:
+        is_there = watching["alive"] and service.get("spare") is not None
+        found["spare"] = {"pid": service.get("spare"), "alive": is_there, "age_s": None}
+        found["service"] = watching
+    restarts = service.get("restarts") or {}
+    for name, process in found.items():
+        process["restarts"] = restarts.get(name)
+    return found
 
 
 def _process(snapshot: Mapping[str, Any], now: int) -> dict[str, Any]:

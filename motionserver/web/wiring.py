@@ -16,6 +16,7 @@ from motionserver.web.config import WebConfig
 
 GUARD_SNAPSHOT: Final = "guard.map"
 PLANNER_SNAPSHOT: Final = "planner.map"
+SERVICE_SNAPSHOT: Final = "service.map"
 GUARD_REQUESTS: Final = "guard.sock"
 PLANNER_REQUESTS: Final = "planner.sock"
 _PATIENCE: Final = 1.0
@@ -60,6 +61,7 @@ def wired_app(config: WebConfig) -> FastAPI:
         config,
         MappedSnapshot(folder / GUARD_SNAPSHOT),
         MappedSnapshot(folder / PLANNER_SNAPSHOT),
+        MappedSnapshot(folder / SERVICE_SNAPSHOT),
         partial(ask, folder / GUARD_REQUESTS, timeout=_PATIENCE),
         partial(ask, folder / PLANNER_REQUESTS, timeout=_PATIENCE),
     )

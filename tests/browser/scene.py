@@ -97,13 +97,14 @@ class Scene:
 
     def wanted(self, t):
         gain = self.book.model.scale if self.state == "RUN" else 0.0
-        x = 2.6 * math.sin(0.42 * t) * abs(math.sin(0.17 * t)) - 1.4 * (math.sin(0.9 * t) > 0.93)
+        x = 2.6 * math.sin(0.42 * t) * math.sin(0.17 * t) ** 2
+        x -= 0.8 * math.exp(4 * (math.sin(0.9 * t) - 1))
         y = 2.1 * math.sin(0.31 * t + 1) + 0.5 * math.sin(1.9 * t) * math.cos(0.13 * t)
         z = 0.5 * math.sin(5.1 * t) * math.sin(0.7 * t) ** 2 + 0.25 * math.sin(11 * t)
         return gain * np.array([x, y, z])
 
     def pose(self, t):
-        f = self.wanted(t - 0.12)
+        f = self.wanted(t - 0.12) * [1, 1, 0.35]
         slow = self.wanted(t - 0.7)
         up = self.share()
         pose = np.array([
@@ -145,9 +146,9 @@ class Scene:
             "rates_hz": {"tick": 240.0, "send": 60.0, "planner": 100.0},
             "tick": {"late_p50_ms": 0.06, "late_p99_ms": 0.41, "late_max_ms": 2.3, "missed": 0},
             "rejections": [
-                {"t_ns": int((self.started + 4) * 1e9), "reason": "leg speed", "when": 0.312,
+                {"t_ns": int((self.started + 4) * 1e9), "reason": "leg-speed", "when": 0.312,
                  "leg": 3, "value": 0.613, "allowed": 0.6},
-                {"t_ns": int((self.started + 2) * 1e9), "reason": "leg length", "when": 1.104,
+                {"t_ns": int((self.started + 2) * 1e9), "reason": "leg-length", "when": 1.104,
                  "leg": 5, "value": 1.1817, "allowed": 1.1811},
             ],
             "events": self.events[-12:],
@@ -161,7 +162,8 @@ class Scene:
         wanted = self.wanted(t)
         rng = np.random.default_rng(self.tick)
         near = np.abs(q) / self.machine.box
-        x_max = self.machine.box * (1 - 0.45 * np.clip(near + 0.1, 0, 1) ** 2)
+        swing = 0.5 + 0.5 * np.sin(0.23 * t + np.arange(6))
+        x_max = self.machine.box * (1 - 0.5 * swing**4 - 0.1 * near)
         measured = (force + rng.normal(0, 0.06, 3)).tolist()
         return {
             "pid": os.getpid() + 1,
@@ -176,13 +178,25 @@ class Scene:
                        "rate_hz": 99.8, "mode": "DRIVE", "fresh": True, "session": 71},
             "solver": {"backend": self.book.model.backend, "time_p50_ms": 1.3,
                        "time_p99_ms": 2.4, "last_ms": 1.2, "iterations": 27, "status": "solved"},
-            "kappa": 1.0, "refused": 3, "halved": 41,
-            "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0},
+            "kappa": 1.0,
+            "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0, "plans_halved": 41,
+                         "plans_refused": 3},
             "tuning": {"version": self.book.version, "values": self.book.model.model_dump()},
             "disturbance": [0.0, 0.0, 0.0],
             "rates_hz": {"planner": 100.0},
-            "tracking": None,
+            "tracking": {"mismatch": 0.061, "alarm": False}, "trouble": "",
         }  # fmt: skip
+
+    def service(self):
+        return {
+            "pid": os.getpid() + 2,
+            "t_ns": time.monotonic_ns(),
+            "guard": os.getpid(),
+            "spare": os.getpid() + 3,
+            "planner": os.getpid() + 1,
+            "web": None,
+            "restarts": {"guard": 0, "planner": 1, "web": 0},
+        }
 
 
 class Peers:
@@ -192,6 +206,7 @@ class Peers:
         self.scene = scene
         self._guard = MappedFile(run_dir / wiring.GUARD_SNAPSHOT, CAPACITY)
         self._planner = MappedFile(run_dir / wiring.PLANNER_SNAPSHOT, CAPACITY)
+        self._service = MappedFile(run_dir / wiring.SERVICE_SNAPSHOT, CAPACITY)
         self._guard_requests = RequestServer(run_dir / wiring.GUARD_REQUESTS)
         self._planner_requests = RequestServer(run_dir / wiring.PLANNER_REQUESTS)
         self._end = threading.Event()
@@ -204,7 +219,9 @@ class Peers:
     def __exit__(self, *_):
         self._end.set()
         self._thread.join()
-        for item in (self._guard, self._planner, self._guard_requests, self._planner_requests):
+        self._guard_requests.close()
+        self._planner_requests.close()
+        for item in (self._guard, self._planner, self._service):
             item.close()
 
     def _run(self):
@@ -212,6 +229,7 @@ class Peers:
         while not self._end.wait(0.02):
             scene.tick += 1
             scene.advance()
+            self._service.write(json.dumps(scene.service()).encode())
             if "guard" not in scene.dead:
                 for request, address in self._guard_requests.poll():
                     self._guard_requests.answer(address, scene.answer_guard(request))

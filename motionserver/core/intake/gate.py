@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from motionserver.core.axes import GRAVITY
+from motionserver.core.axes import GRAVITY, Array
 from motionserver.core.intake.freshness import SECOND_NS, Freshness
 from motionserver.core.state import DriveMode, VehicleMotion
 
@@ -18,6 +18,10 @@ IMPLAUSIBLE_FORCE: Final = 10.0 * GRAVITY
 """Specific force no road vehicle survives: the packet is not believed [m/s2]."""
 IMPLAUSIBLE_RATE: Final = np.radians(4000.0)
 """Body rate beyond every vehicle: the packet is not believed [rad/s]."""
+FASTEST: Final = 1000.0
+"""Speed beyond every vehicle: the packet is not believed [m/s]."""
+FARTHEST: Final = 60.0
+"""A preview beyond this is not believed [s]."""
 _LEAK: Final = 100e-6
 """Upward drift of the least delay, so that a slow sender clock is followed [s/s]."""
 
@@ -58,17 +62,19 @@ class Gate:
         """
         who = Owner(source, address, motion.session)
         now = motion.arrival_ns
+        silent = self._is_silent(now)
         if who != self.owner:
             if not self._may_own(now):
                 return "second-client"
         elif (order := self._order(motion)) is not None:
             return order
-        if max(abs(float(x)) for x in motion.force) > IMPLAUSIBLE_FORCE or (
-            max(abs(float(x)) for x in motion.rates) > IMPLAUSIBLE_RATE
-        ):
+        if not _is_plausible(motion):
             return "out-of-range"
         if who != self.owner:
             self._hand_over(who)
+        elif silent:
+            # a longer way or a sender's clock that stood still: the delay is learnt anew
+            self._least_offset = None
         elif self._is_old(motion):
             return "old"
         if motion.sequence is not None and self._sequence is not None:
@@ -81,9 +87,12 @@ class Gate:
     def _may_own(self, now_ns: int) -> bool:
         if self.owner is None:
             return True
+        left = self.mode is DriveMode.BYE or self._is_silent(now_ns)
+        return left and self._may_change_owner()
+
+    def _is_silent(self, now_ns: int) -> bool:
         age = self.freshness.age_ns(now_ns)
-        silent = self.mode is DriveMode.BYE or age is None or age > REORDER_NS
-        return silent and self._may_change_owner()
+        return age is None or age > REORDER_NS
 
     def _order(self, motion: VehicleMotion) -> str | None:
         if motion.sequence is None or self._sequence is None:
@@ -110,3 +119,22 @@ class Gate:
         self._offset_at_ns = motion.arrival_ns
         self._least_offset = min(self._least_offset + drift, offset)
         return offset - self._least_offset > self.freshness.stale_after_ns()
+
+
+def _is_plausible(motion: VehicleMotion) -> bool:
+    """False for what no vehicle does, for what is no number, for a future that is none."""
+    if not (_is_within(motion.force, motion.rates) and abs(motion.speed) <= FASTEST):
+        return False
+    preview = motion.preview
+    if preview is None:
+        return True
+    times = preview.times
+    ahead = bool(times[0] >= 0.0 and times[-1] <= FARTHEST and np.all(np.diff(times) > 0.0))
+    return ahead and _is_within(preview.force, preview.rates)
+
+
+def _is_within(force: Array, rates: Array) -> bool:
+    # asked so that a NaN is outside
+    return bool(
+        np.all(np.abs(force) <= IMPLAUSIBLE_FORCE) and np.all(np.abs(rates) <= IMPLAUSIBLE_RATE)
+    )

@@ -49,6 +49,8 @@ class Intake:
         self._newest: VehicleMotion | None = None
         self._force = np.zeros(3)
         self._rates = np.zeros(3)
+        self._spin = np.zeros(3)
+        self._used: VehicleMotion | None = None
         self._blanked = False
 
     @property
@@ -78,6 +80,9 @@ class Intake:
         motion = self._newest
         if motion is None:
             return STILL
+        if motion is not self._used:
+            self._spin = self._spin_of(motion, period)
+            self._used = motion
         drives = wanted and motion.mode is DriveMode.DRIVE and not self._blanked
         target = 1.0 if drives else 0.0
         step = period / (FADE_IN if target > self.gain else FADE_OUT)
@@ -86,9 +91,10 @@ class Intake:
             # hold what was felt before the jump until it has faded, then begin anew
             if self.gain <= 0.0:
                 self._blanked = False
-                self._force, self._rates = self._wish(motion, head, period)
+                self._spin = np.zeros(3)
+                self._force, self._rates = self._wish(motion, head)
         elif motion.mode is DriveMode.DRIVE:
-            force, rates = self._wish(motion, head, period)
+            force, rates = self._wish(motion, head)
             reach = SLEW * period
             self._force = self._force + np.clip(force - self._force, -reach, reach)
             self._rates = rates
@@ -100,11 +106,16 @@ class Intake:
             None if self._blanked else _scaled(motion.preview, head, share),
         )
 
-    def _wish(self, motion: VehicleMotion, head: Head, period: float) -> tuple[Array, Array]:
-        force = motion.force
-        if head.arm.any():
-            spin = (motion.rates - self._rates) / period
-            force = transfer(force, motion.rates, spin, head.arm)
+    def _spin_of(self, motion: VehicleMotion, period: float) -> Array:
+        """Rates' derivative from the packet used before to this one, (3,) [rad/s2]."""
+        if self._used is None or self._used.mode is not DriveMode.DRIVE:
+            return np.zeros(3)
+        # packets are read once per period, so closer ones arrived a period apart at least
+        elapsed = max(period, (motion.arrival_ns - self._used.arrival_ns) * 1e-9)
+        return np.asarray((motion.rates - self._used.rates) / elapsed)
+
+    def _wish(self, motion: VehicleMotion, head: Head) -> tuple[Array, Array]:
+        force = transfer(motion.force, motion.rates, self._spin, head.arm)
         wish = np.clip(force - _UP, -FORCE_MAX, FORCE_MAX)
         rates = np.clip(motion.rates, -RATE_MAX, RATE_MAX)
         self.clipped += int((wish != force - _UP).any() or (rates != motion.rates).any())

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import (
     conditioning,
+    is_conditioned,
     joint_angles,
     leg_lengths,
     neutral_conditioning,
@@ -157,9 +158,9 @@ def _check_posture(
             return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
     if machine.conditioning is not None:
         rows = _thinned(len(poses), every[1])
-        found = conditioning(machine, poses[rows])
         allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
-        if found.min() < allowed:
+        if not is_conditioned(machine, poses[rows], allowed):
+            found = conditioning(machine, poses[rows])
             when = at(int(rows[found.argmin()]))
             return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None
@@ -197,16 +198,16 @@ def check_ways_home(
     machine: Machine, rest: Array, homes: Array, margins: Margins
 ) -> Rejection | None:
     """From the rest pose (6,) a straight, allowed way to each of the poses ``homes`` (H, 6)."""
-    for home in homes:
-        way = straight_way(machine, rest, home)
-        low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
+    ways = [straight_way(machine, rest, home) for home in homes]
+    low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
+    for way in ways:
         beyond = max(low - float(way.legs.min()), float(way.legs.max()) - high)
         if beyond > 0.0:
             return Rejection(Reason.NO_WAY_HOME, None, None, beyond, 0.0)
-        every = (_WAY_EVERY, _WAY_EVERY)
-        posture = _check_posture(machine, way.poses, margins, every, lambda row: None)
-        if posture is not None:
-            return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
         if way.duration > LONGEST_MOVE:
             return Rejection(Reason.NO_WAY_HOME, None, None, way.duration, LONGEST_MOVE)
+    poses = np.concatenate([way.poses for way in ways])
+    posture = _check_posture(machine, poses, margins, (_WAY_EVERY, _WAY_EVERY), lambda row: None)
+    if posture is not None:
+        return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
     return None

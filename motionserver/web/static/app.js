@@ -72,6 +72,7 @@ async function identify() {
     hasToken: answer.ok && answer.headers.get("x-motion-token") === "yes",
   };
   const wrong = answer.status === 401;
+  put(byId("answer"), caller.hasToken ? "" : "To engage, park or tune, enter a token above; the server made three in its tokens file.");
   byId("role").className = `pill ${wrong ? "bad" : caller.hasToken ? "good" : ""}`;
   put(byId("role"), wrong ? "unknown token" : caller.role);
   tuning.mayTune = caller.hasToken && caller.role !== "viewer";

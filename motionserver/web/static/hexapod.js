@@ -25,8 +25,8 @@ export class Hexapod {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
     this.pose = null;
-    this.turn = -0.62;
-    this.lift = 0.3;
+    this.turn = 0.5;
+    this.lift = 0.34;
     this.status = null;
     this.drag();
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -61,10 +61,10 @@ export class Hexapod {
     const [cl, sl] = [Math.cos(this.lift), Math.sin(this.lift)];
     const depth = x * ca + y * sa;
     const right = y * ca - x * sa;
-    const [up, far] = [(z - this.middle) * cl + depth * sl * -1, depth * cl + (z - this.middle) * sl];
+    const [up, far] = [(z - this.middle) * cl + depth * sl, depth * cl - (z - this.middle) * sl];
     const zoom = 7.2 / (7.2 + far);
-    const size = Math.min(this.height / 2.05, this.width / 3.5) * zoom;
-    return [this.width / 2 - right * size, this.height * 0.5 - up * size, far];
+    const size = Math.min(this.height / 2.45, this.width / 3.5) * zoom;
+    return [this.width / 2 - right * size, this.height * 0.43 - up * size, far];
   }
 
   line(a, b, colour, width, dash = []) {
@@ -104,6 +104,10 @@ export class Hexapod {
     c.font = "600 12px system-ui, sans-serif";
     c.textAlign = "center";
     c.textBaseline = "middle";
+    c.strokeStyle = "#151c23";
+    c.lineWidth = 4;
+    c.setLineDash([]);
+    c.strokeText(text, p[0], p[1]);
     c.fillText(text, p[0], p[1]);
   }
 
@@ -117,7 +121,7 @@ export class Hexapod {
     c.lineCap = "round";
     c.lineJoin = "round";
     const height = machine.neutral_height;
-    this.middle = height * 0.6;
+    this.middle = height * 0.56;
     this.floor();
     const base = machine.base_joints;
     const carried = (points, pose) => {
@@ -136,10 +140,10 @@ export class Hexapod {
     const [o, s] = see([origin, seat]);
     this.line(s, o, "rgba(232,237,242,.45)", 2);
     const arms = carried([[0.42, 0, 0], [0, 0.42, 0], [0, 0, 0.42]].map((a) => a.map((v, i) => v + head[i])), this.pose);
-    [["x", "#e69f00"], ["y", "#35c9a3"], ["z", "#d79ac0"]].forEach(([name, colour], i) => {
+    [["x fwd", "#e69f00"], ["y", "#35c9a3"], ["z", "#d79ac0"]].forEach(([name, colour], i) => {
       const tip = this.project(arms[i]);
       this.line(o, tip, colour, 2.2);
-      this.label([tip[0] + (tip[0] - o[0]) * 0.16, tip[1] + (tip[1] - o[1]) * 0.16], name, colour);
+      this.label([tip[0] + (tip[0] - o[0]) * (i ? 0.16 : 0.4), tip[1] + (tip[1] - o[1]) * 0.16], name, colour);
     });
     this.dot(o, 8, "#0d1217");
     this.dot(o, 6.2, "#e8edf2");
@@ -151,8 +155,6 @@ export class Hexapod {
       this.line(this.project([k, -1.8, 0]), this.project([k, 1.8, 0]), "rgba(143,161,179,.10)", 1);
       this.line(this.project([-1.8, k, 0]), this.project([1.8, k, 0]), "rgba(143,161,179,.10)", 1);
     }
-    const ahead = this.project([2.0, 0, 0]);
-    this.label(ahead, "front", "rgba(159,173,186,.8)");
   }
 
   legs(base, top, guard) {

@@ -41,7 +41,7 @@ export class Legs {
       row.rate.style.width = `${50 * Math.abs(pace)}%`;
       row.rate.style.background = Math.abs(pace) > 0.9 ? "#ff7a45" : "#8ba0b5";
       put(row.length, fixed(length, 3, "m"));
-      put(row.pace, isNumber(rate) ? `${rate >= 0 ? "+" : ""}${fixed(rate, 2)} m/s` : "–");
+      put(row.pace, isNumber(rate) ? `${rate >= 0.005 ? "+" : ""}${fixed(rate, 2)} m/s` : "–");
     });
     this.limits(limits);
   }

@@ -15,7 +15,7 @@ export function showState(status) {
   put(byId("reason"), String(status.reason || "–"));
   const since = status.guard?.since_ns;
   put(byId("since"), isNumber(since) ? `for ${duration((status.t_ns - since) / 1e9)}` : "–");
-  put(byId("algorithm"), status.algorithm ? `algorithm ${status.algorithm}` : "no planner");
+  put(byId("algorithm"), (status.algorithm ? `algorithm ${status.algorithm}` : "no planner") + (status.guard?.dry_run ? " · dry run: nothing moves" : ""));
   put(byId("machine"), String(status.machine?.name || "–"));
   put(byId("digest"), status.guard?.limits?.digest ? `limits ${status.guard.limits.digest}` : "");
   document.title = `${status.state} – motionserver`;
@@ -34,7 +34,8 @@ function processes(all) {
     }
     pill.className = `pill ${process.alive ? "good" : "bad"}`;
     pill.title = isNumber(process.pid) ? `process ${process.pid}` : "";
-    put(pill, process.alive ? name : `${name} ${isNumber(process.age_s) ? `silent ${duration(process.age_s)}` : "absent"}`);
+    const again = process.restarts ? ` · ${process.restarts} restart${process.restarts > 1 ? "s" : ""}` : "";
+    put(pill, process.alive ? name + again : `${name} ${isNumber(process.age_s) ? `silent ${duration(process.age_s)}` : "absent"}`);
   }
 }
 
@@ -59,7 +60,7 @@ function pose(values) {
 export function showNumbers(status) {
   const g = status.guard || {}, p = status.planner || {};
   const source = p.source || {}, solver = p.solver || {}, tick = g.tick || {}, feedback = g.feedback || {};
-  const ms = (seconds) => (isNumber(seconds) ? fixed(1e3 * seconds, 1, "ms") : "–");
+  const ms = (seconds) => (isNumber(seconds) ? fixed(Math.max(0, 1e3 * seconds), 1, "ms") : "–");
   rows(byId("numbers"), [
     ["Source", source.address ? `${source.kind} ${source.address}` : "none", source.address && !source.fresh],
     ["Device", feedback.device_state || "–", list(feedback.faults).length > 0],
@@ -68,15 +69,17 @@ export function showNumbers(status) {
     ["Cue rate", `${fixed(source.rate_hz, 1, "Hz")}, ${source.mode || "–"}`],
     ["Send rate", fixed(status.rates_hz?.send, 1, "Hz")],
     ["Planner rate", fixed(status.rates_hz?.planner, 1, "Hz")],
-    ["Guard tick", fixed(status.rates_hz?.tick, 0, "Hz")],
+    ["Guard tick", fixed(status.rates_hz?.tick, 0, "Hz") + (tick.scheduling ? `, ${tick.scheduling}` : "")],
     ["Solver p50 / p99", `${fixed(solver.time_p50_ms, 1)} / ${fixed(solver.time_p99_ms, 1)} ms`],
     ["Tick late p50 / p99", `${fixed(tick.late_p50_ms, 2)} / ${fixed(tick.late_p99_ms, 2)} ms`],
     ["Solver", `${solver.backend || "–"}, ${solver.status || "–"}, ${fixed(solver.iterations, 0)} it.`],
     ["Tick late max, missed", `${fixed(tick.late_max_ms, 1)} ms, ${fixed(tick.missed, 0)}`, tick.missed > 0],
     ["Plan share κ", fixed(p.kappa ?? g.plan?.kappa, 3)],
     ["Tracking error", isNumber(g.tracking_error) ? fixed(1e3 * g.tracking_error, 2, "mm") : "–"],
-    ["Plans halved, refused", `${fixed(p.halved, 0)}, ${fixed(p.refused, 0)}`],
-    ["Plan played", g.plan ? `${g.plan.id}: ${fixed(g.plan.time, 2)} of ${fixed(g.plan.duration, 2)} s` : "–"],
+    ["Plans halved, refused", `${fixed(p.halved ?? p.counters?.plans_halved ?? 0, 0)}, ${fixed(p.refused ?? p.counters?.plans_refused ?? 0, 0)}`],
+    ["Plan played", g.plan ? `${fixed(Math.max(0, g.plan.time), 2)} of ${fixed(g.plan.duration, 2)} s` : "–"],
+    ...(isNumber(p.tracking?.mismatch) ? [["Measured against felt", fixed(p.tracking.mismatch, 2, "m/s²"), p.tracking.alarm]] : []),
+    ...[["Planner", p.trouble], ["Source error", source.last_error]].filter(([, text]) => text).map(([name, text]) => [name, text, true]),
     ...list(feedback.faults).map((fault) => ["Device fault", String(fault), true]),
   ]);
 }
@@ -100,8 +103,8 @@ export function showLog(status) {
   const ago = (ns) => (isNumber(ns) ? `${duration((status.t_ns - ns) / 1e9)} ago` : "–");
   const newest = (items) => list(items).slice().sort((a, b) => b.t_ns - a.t_ns);
   lines(byId("rejections"), newest(status.guard?.rejections).map((r) => [ago(r.t_ns),
-    `${r.reason}${isNumber(r.leg) ? `, leg ${r.leg}` : ""} at ${fixed(r.when, 2)} s of the plan: ${short(r.value)}, allowed ${short(r.allowed)}`]), "None. Every plan passed.");
-  lines(byId("events"), newest(status.guard?.events).map((e) => [ago(e.t_ns), String(e.text)]), "Nothing yet.");
+    `${String(r.reason).replaceAll("-", " ")}${isNumber(r.leg) ? `, leg ${r.leg + 1}` : ""}${isNumber(r.when) ? ` at ${fixed(r.when, 2)} s of the plan` : ""}${isNumber(r.value) ? `: ${short(r.value)}, allowed ${short(r.allowed)}` : ""}`]), "None. Every plan passed.");
+  lines(byId("events"), newest(status.guard?.events).map((e) => [ago(e.t_ns), String(e.text).replaceAll("->", "→")]), "Nothing yet.");
 }
 
 const short = (value) => (isNumber(value) ? String(Number(value.toPrecision(5))) : String(value ?? "–"));

@@ -24,7 +24,7 @@ class Plot {
     const y = { ...AXIS, size: size || 44, splits: (u) => { const top = nice(u.scales.y.max * 0.8); return [-top, 0, top]; },
       values: (_, ticks) => ticks.map((t) => String(Number(t.toPrecision(3))).replace("-", "−")) };
     this.plot = new uPlot({
-      width: 300, height: this.height, legend: { show: false }, cursor: { show: false }, padding: [8, 8, 0, 0],
+      width: 300, height: this.height, legend: { show: false }, cursor: { show: false }, padding: [4, 8, 0, 0],
       scales: { x: { time: false, range: [-SPAN, 0] }, y: { range } }, axes: [x, y],
       series: [{}, ...series.map((s) => ({ points: { show: false }, spanGaps: false, ...s }))], bands,
     }, [[], ...series.map(() => [])], this.box);
@@ -77,7 +77,7 @@ export class Plots {
     const last = rows.at(-1);
     this.forces.forEach((plot, i) => {
       plot.plot.setData([times, rows.map((r) => r.wanted[i]), rows.map((r) => r.measured[i]), rows.map((r) => r.felt[i])]);
-      caption(plot.title, FORCE[i], `${fixed(last.felt[i], 2)} felt of ${fixed(last.wanted[i], 2)} m/s²`);
+      caption(plot.title, FORCE[i], `felt ${fixed(last.felt[i], 2)}, wanted ${fixed(last.wanted[i], 2)} m/s²`);
     });
     this.axes.forEach((plot, i) => {
       const [name, unit, k] = POSE[i];

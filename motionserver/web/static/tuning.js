@@ -3,6 +3,8 @@ import { send, sentence } from "./api.js";
 import { byId, make, put } from "./dom.js";
 
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser"];
+const LASTING = 6; // looks, ten a second
+const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
   constructor() {
@@ -11,6 +13,7 @@ export class Tuning {
     this.rows = new Map();
     this.mayTune = false;
     this.busy = false;
+    this.differing = 0;
     byId("tuning").addEventListener("submit", (e) => { e.preventDefault(); this.apply(); });
     byId("discard").addEventListener("click", () => this.fill(this.values));
     byId("undo").addEventListener("click", () => this.undo());
@@ -30,8 +33,9 @@ export class Tuning {
   build(fields) {
     const groups = [...new Set([...ORDER, ...fields.map((f) => f.group)])];
     for (const group of groups) {
-      const column = make("section", "group");
-      column.append(make("h3", "", group));
+      const column = make("details", "group");
+      column.open = innerWidth > 720;
+      column.append(make("summary", "", group));
       for (const field of fields.filter((f) => f.group === group)) column.append(this.row(field));
       byId("fields").append(column);
     }
@@ -55,11 +59,11 @@ export class Tuning {
       input.inputMode = "decimal";
     }
     const help = make("p", "help", `${field.meaning} `);
-    if (!field.choices) help.append(make("span", "range", `${field.min} to ${field.max} ${field.unit}`.trim()));
+    if (!field.choices) help.append(make("span", "range", `${field.min} to ${field.max} ${unit(field)}`.trim()));
     const wrong = make("p", "wrong-text");
     wrong.hidden = true;
     box.append(name, input);
-    if (!field.choices) box.append(make("span", "unit", field.unit));
+    if (!field.choices) box.append(make("span", "unit", unit(field)));
     box.append(help, wrong);
     input.addEventListener("input", () => { this.mark(field.name, ""); this.refresh(); });
     this.rows.set(field.name, { field, box, input, wrong });
@@ -108,14 +112,18 @@ export class Tuning {
     put(byId("apply"), count ? `Apply ${count} change${count > 1 ? "s" : ""}` : "Apply");
     byId("apply").disabled = !count || !this.mayTune || this.busy;
     byId("discard").disabled = !count;
+    document.querySelector(".apply").classList.toggle("pending", count > 0);
     byId("undo").disabled = !this.mayTune || this.version === null || this.busy;
     byId("preset-save").disabled = !this.mayTune;
     byId("apply").title = this.mayTune ? "" : "needs the tuner's or operator's token";
   }
 
-  // Somebody else changed the tuning: show it, unless changes are pending here.
+  // Somebody else changed the tuning: show it, unless changes are pending here. The status may be
+  // older than an answer just received, so a difference counts only once it has lasted.
   noticed(version) {
-    if (this.version === null || version === undefined || version === this.version || this.busy) return;
+    const differs = this.version !== null && version !== undefined && version !== this.version && !this.busy;
+    this.differing = differs ? this.differing + 1 : 0;
+    if (this.differing !== LASTING) return;
     if (Object.keys(this.changes()).length === 0) this.load();
     else this.say(`The tuning is at version ${version} by now; apply will be refused until you discard.`, true);
   }
@@ -134,8 +142,11 @@ export class Tuning {
       this.take(answer.body);
       this.say(done(answer.body));
     } else {
-      for (const item of answer.body.details || []) this.mark(item.field, `${item.message}; allowed ${item.allowed}`);
-      this.say(sentence(answer.body), true);
+      for (const item of answer.body.details || []) {
+        if (this.mark(item.field, `${item.message}; allowed ${item.allowed}`)) this.rows.get(item.field).box.parentNode.open = true;
+      }
+      const wrong = (answer.body.details || []).length;
+      this.say(wrong ? `Nothing was changed: ${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields.` : sentence(answer.body), true);
       if (answer.status === 412) this.values = (await send("GET", "/api/tuning")).body.values || this.values;
       if (answer.status === 412 && answer.body.version) this.version = answer.body.version;
       this.refresh();

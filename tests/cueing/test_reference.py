@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+
+from motionserver.core.state import Preview, Stimulus
+from motionserver.cueing.reference import HEAVE_FADE, Reference
+
+TIMES = np.array([0.01, 0.1, 0.5, 1.0, 2.0])
+
+
+def stimulus(force=(1.0, 2.0, 3.0), rates=(0.1, 0.2, 0.3), preview=None):
+    return Stimulus(np.array(force), np.array(rates), 1.0, preview)
+
+
+def test_constant_holds_surge_and_sway_and_fades_heave():
+    out = Reference("constant", 0.01, TIMES, 0.0).predict(stimulus())
+    assert out[:, 0] == pytest.approx(np.full(5, 1.0))
+    assert out[:, 1] == pytest.approx(np.full(5, 2.0))
+    assert out[:, 2] == pytest.approx(3.0 * np.exp(-TIMES / HEAVE_FADE))
+    assert (np.diff(out[:, 3:], axis=0) < 0).all()
+
+
+def test_fade():
+    out = Reference("fade", 0.01, TIMES, 0.0).predict(stimulus())
+    assert out[:, 0] == pytest.approx(np.exp(-TIMES))
+
+
+def test_ar_begins_at_now_and_is_bounded():
+    model = Reference("ar", 0.01, TIMES, 0.0)
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        out = model.predict(stimulus(force=5.0 * rng.normal(size=3)))
+        assert (np.abs(out[-1, :2]) < 8.5).all()
+    out = model.predict(stimulus(force=(4.0, -4.0, 0.0)))
+    assert out[0, 0] == pytest.approx(4.0, abs=0.6)
+    assert out[0, 1] == pytest.approx(-4.0, abs=0.6)
+
+
+def test_ar_beats_constant_on_a_slalom():
+    lead, ahead = 0.01, np.array([0.5])
+    wave = lambda t: 3.0 * np.sin(2 * np.pi * 0.3 * t)  # noqa: E731
+    errors = {}
+    for name in ("ar", "constant"):
+        model, error = Reference(name, 0.01, ahead, lead), []
+        for k in range(4000):
+            t = 0.01 * k
+            out = model.predict(stimulus(force=(0.0, wave(t), 0.0)))
+            if k > 2000:
+                error.append(out[0, 1] - wave(t + ahead[0] + lead))
+        errors[name] = np.sqrt(np.mean(np.square(error)))
+    assert errors["ar"] < 0.5 * errors["constant"]
+
+
+def test_ar_survives_what_is_no_number():
+    model = Reference("ar", 0.01, TIMES, 0.0)
+    model.predict(stimulus(force=(np.nan, 0.0, 0.0)))
+    for _ in range(20):
+        out = model.predict(stimulus())
+    assert np.isfinite(out).all()
+
+
+def test_preview_is_followed_exactly_then_passes_into_the_model():
+    times = np.array([0.0, 0.5, 1.0])
+    force = np.array([[1.0, 0, 0], [2.0, 0, 0], [5.0, 0, 0]])
+    preview = Preview(times, force, np.zeros((3, 3)))
+    out = Reference("constant", 0.01, np.array([0.25, 0.75, 1.0, 20.0]), 0.0).predict(
+        stimulus(preview=preview)
+    )
+    assert out[:3, 0] == pytest.approx([1.5, 3.5, 5.0])
+    assert out[3, 0] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_preview_that_begins_later_is_joined_to_now():
+    preview = Preview(np.array([1.0]), np.array([[3.0, 0, 0]]), np.zeros((1, 3)))
+    out = Reference("constant", 0.01, np.array([0.5]), 0.0).predict(stimulus(preview=preview))
+    assert out[0, 0] == pytest.approx(2.0)
+
+
+def test_lead_is_counted():
+    preview = Preview(np.array([0.0, 1.0]), np.array([[0.0] * 3, [1.0] * 3]), np.zeros((2, 3)))
+    out = Reference("constant", 0.01, np.array([0.3]), 0.2).predict(stimulus(preview=preview))
+    assert out[0, 0] == pytest.approx(0.5)
+
+
+def test_unknown_model():
+    with pytest.raises(ValueError, match="constant, fade, ar"):
+        Reference("oracle", 0.01, TIMES, 0.0)
