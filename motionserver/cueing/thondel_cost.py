@@ -86,9 +86,7 @@ def make_cost(plant: Plant, tuning: Tuning) -> Cost:
         for_input = np.diag(2.0 * tuning.weight_input * INPUT_WEIGHT[index] * lengths)
         hessian[own, own] += for_input
         from_input[own, own] = -for_input
-        steps = np.diag(
-            2.0 * tuning.weight_change * INPUT_WEIGHT[index] / np.maximum(lengths, 1.0)
-        )
+        steps = np.diag(2.0 * tuning.weight_change * INPUT_WEIGHT[index] / np.maximum(lengths, 1.0))
         hessian[own, own] += change.T @ steps @ change
         from_last[own, index] = -steps[0, 0] * change[0]
         axis = channel.axes[0]

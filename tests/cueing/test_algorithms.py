@@ -84,7 +84,9 @@ class CueingContract:
 
     @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
     def test_wild_numbers_do_not_raise(self, machine, cueing, bad):
-        stimuli = [BRAKE] * 5 + [stimulus_of((bad, 0, 0))] * 3 + [stimulus_of((0, 0, 0), (0, bad, bad))]
+        stimuli = (
+            [BRAKE] * 5 + [stimulus_of((bad, 0, 0))] * 3 + [stimulus_of((0, 0, 0), (0, bad, bad))]
+        )
         played = play(machine, cueing, [*stimuli, *[BRAKE] * 10])
         assert played.violations(machine) == 0
         assert played.candidates[-1] is not None

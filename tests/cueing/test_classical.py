@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from motionserver.core.axes import Axis
 from motionserver.cueing.classical import REID_NAHON, Classical, TiltLoop
-from motionserver.cueing.filters import check_controllable, channel, discretise, low_pass
+from motionserver.cueing.filters import channel, check_controllable, discretise, low_pass
 from motionserver.cueing.tuning import Tuning
 
 STEPS = np.full(200, 0.01)

@@ -31,7 +31,7 @@ def test_fig3_poles():
 def test_fig3_last_rows_and_input():
     assert PLANT.A[2] == pytest.approx([-245, -152.25, -27, 0, 0, 0])
     assert PLANT.A[5] == pytest.approx([0, 0, 0, -50, -54, -16.5])
-    assert PLANT.B == pytest.approx([0, 0, 20, 0, 0, 5.09684], abs=1e-5)
+    assert pytest.approx([0, 0, 20, 0, 0, 5.09684], abs=1e-5) == PLANT.B
 
 
 def test_fig3_steady_state():
