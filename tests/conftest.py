@@ -1,7 +1,6 @@
-"""One profile of hypothesis for all: the same examples in every run, no deadline."""
+"""What holds for all tests: no example is judged by how long it took on a busy machine."""
 
 from hypothesis import settings
 
-# the machines are shared: how long an example takes says nothing, and a test must not be lucky
 settings.register_profile("house", deadline=None, derandomize=True)
 settings.load_profile("house")

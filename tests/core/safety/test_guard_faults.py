@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from device_model import Bench
 from machines import compact
-from own_kinematics import lengths
 from proposals import goals
 from test_guard_life import away, legal
 
@@ -183,7 +182,6 @@ def test_a_device_that_measures_nothing_is_trusted_but_not_started_from():
     ("legs", "words"),
     [
         (np.full(6, 1.19), "cannot stand here"),
-        (lengths(compact(), swung())[0], "cannot stand here"),
         (np.full(6, 0.3), "no pose found"),
         (np.full(6, 3e38), "no pose found"),
     ],
@@ -198,6 +196,15 @@ def test_measured_legs_that_cannot_be_are_a_fault(legs, words):
     b.run(0.5)
     assert b.tick("reset") == ("",)
     b.until("PARKED", 20.0)
+
+
+def test_a_measured_pose_that_breaks_a_rule_is_a_fault():
+    b = Bench(compact())
+    b.device.put_up(np.zeros(6))
+    whole = b.device.answer
+    b.device.answer = lambda now: replace(whole(now), legs=None, pose=swung())
+    b.until("FAULT", 1.0)
+    assert "cannot stand here: plan rejected: joint-angle" in b.record.reason
 
 
 def test_reset_is_refused_where_it_makes_no_sense():

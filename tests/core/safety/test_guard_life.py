@@ -166,12 +166,13 @@ def test_it_runs_only_after_half_a_second_of_driving():
     assert b.until("RUN", 1.0) == pytest.approx(0.5, abs=0.02)
 
 
-def test_ready_parks_after_thirty_seconds_of_silence():
-    b = bench()
+def test_ready_parks_after_long_silence():
+    assert Patience().silence == 30.0
+    b = bench(patience=Patience(silence=3.0))
     b.mode = DriveMode.PAUSE
     b.engaged("READY")
     b.source = False
-    assert b.until("PARKING", 31.0) == pytest.approx(30.15, abs=0.05)
+    assert b.until("PARKING", 4.0) == pytest.approx(3.15, abs=0.05)
 
 
 def test_a_stale_source_holds_and_then_parks():
