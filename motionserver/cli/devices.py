@@ -39,7 +39,7 @@ def emulate(
     seed: int,
     cut_after: float | None,
 ) -> dict[str, object]:
-    """Be a device until a signal; returns the judge's verdict."""
+    """Be a device until a signal, as punctual as permitted; returns the judge's verdict."""
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)

@@ -19,6 +19,10 @@ from motionserver.settings.resolve import resolve
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.requests import RequestError, ask
+from motionserver.telemetry.ticker import now_ns
+
+SILENT_NS = 2_000_000_000
+"""Age of the guard's last word beyond which nobody runs [ns]."""
 
 
 class NotRunningError(MotionServerError):
@@ -96,7 +100,7 @@ def status_text(path: Path | None, as_json: bool) -> str:
     try:
         maps = Maps(run_dir)
     except (OSError, ValueError) as error:
-        raise NotRunningError(f"status: no server has run in {run_dir} ({error})") from error
+        raise NotRunningError(f"status: no server runs in {run_dir} ({error})") from error
     parts = {}
     for name, source in (
         ("guard", maps.guard),
@@ -105,9 +109,14 @@ def status_text(path: Path | None, as_json: bool) -> str:
     ):
         message = source.read()
         parts[name] = None if message is None else json.loads(message[1])
+    guard, planner = parts["guard"], parts["planner"]
+    if guard is not None and (age := now_ns() - guard["t_ns"]) > SILENT_NS:
+        raise NotRunningError(
+            f"status: no server runs in {run_dir}; its last word is {age * 1e-9:.0f} s old: "
+            f"{guard['state']}, {guard['reason']}"
+        )
     if as_json:
         return json.dumps(parts, indent=2)
-    guard, planner = parts["guard"], parts["planner"]
     if guard is None:
         return "the guard has not shown anything yet"
     lines = [

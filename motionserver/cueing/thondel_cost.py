@@ -16,6 +16,8 @@ TIME_UNIT: Final = 0.05
 """A weight counts once per this time, whatever the grid [s]."""
 CHANNEL_WEIGHT: Final = (1.0, 1.0, 0.3, 4.0)
 """Surge, sway, heave [(m/s2)-2], yaw [(rad/s)-2]: errors of different kinds against each other."""
+INPUT_WEIGHT: Final = (1.0, 1.0, 0.3, 0.05)
+"""The same for inputs; that of yaw is a yaw acceleration, of which turns need much."""
 YAW_ANGLE_WEIGHT: Final = 0.3
 """Weight of the yaw angle against that of a position [m2/rad2]."""
 
@@ -81,10 +83,10 @@ def make_cost(plant: Plant, tuning: Tuning) -> Cost:
         hessian[own, own] += output.T @ weighed
         from_state[own] += weighed.T @ plant.out_phi[index]
         from_error[own, index * count : (index + 1) * count] = -weighed.T
-        for_input = np.diag(2.0 * tuning.weight_input * weight * lengths)
+        for_input = np.diag(2.0 * tuning.weight_input * INPUT_WEIGHT[index] * lengths)
         hessian[own, own] += for_input
         from_input[own, own] = -for_input
-        steps = np.diag(2.0 * tuning.weight_change * weight / np.maximum(lengths, 1.0))
+        steps = np.diag(2.0 * tuning.weight_change * INPUT_WEIGHT[index] / np.maximum(lengths, 1.0))
         hessian[own, own] += change.T @ steps @ change
         from_last[own, index] = -steps[0, 0] * change[0]
         axis = channel.axes[0]

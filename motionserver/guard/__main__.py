@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import logging
+import signal
 import sys
 from pathlib import Path
 
@@ -15,7 +16,13 @@ from motionserver.telemetry.parent import follow_parent
 
 
 def main() -> int:
-    """Wait for the guard's lock, then run: the second process started is a warm spare."""
+    """Wait for the guard's lock, then run: the second process started is a warm spare.
+
+    A spare that is told to end while it waits remembers it: it parks if its turn comes, since
+    the guard before it may have died while parking.
+    """
+    told: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
     follow_parent()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
@@ -24,8 +31,9 @@ def main() -> int:
     with (run_dir / "guard.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         loop = GuardLoop(options, run_dir, link)
-        if sys.argv[3:] == ["leave"]:
-            loop.ask_to_leave("its predecessor died while parking")
+        signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
+        if told or sys.argv[3:] == ["leave"]:
+            loop.ask_to_leave("told before its turn came")
         return asyncio.run(loop.run())
 
 

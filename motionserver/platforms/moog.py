@@ -94,7 +94,9 @@ class Moog6Dof2000E:
             values = tuple(float(value) for value in places)
         else:
             surge, sway, heave, roll, pitch, yaw = (float(value) for value in setpoint.state.pose)
-            values = (roll, -pitch, self._options.heave_neutral - heave, surge, -yaw, -sway)
+            lift = self._options.heave_neutral - heave
+            # zero minus, not minus: a minus zero would be another word on the wire
+            values = (roll, 0.0 - pitch, lift, surge, 0.0 - yaw, 0.0 - sway)
         return _COMMAND.pack(self._words[setpoint.order], *values, 0)
 
     def decode(self, data: bytes, arrival_ns: int) -> Feedback:

@@ -19,8 +19,8 @@ from motionserver.settings.problems import config_error
 
 PACE_SHARE = 0.9
 """Most of a leg limit that raising and parking may use: a move must pass the same check."""
-Metre = Annotated[float, Field(allow_inf_nan=False, ge=-20.0, le=20.0)]
-Positive = Annotated[float, Field(allow_inf_nan=False, gt=0.0, le=1e4)]
+Metre = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-20.0, le=20.0)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1e4)]
 Point = tuple[Metre, Metre, Metre]
 Joints = tuple[Point, Point, Point, Point, Point, Point]
 

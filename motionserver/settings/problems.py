@@ -14,7 +14,7 @@ from motionserver.errors import ConfigError
 def config_error(
     error: ValidationError, path: Path | None, text: str, model: type[BaseModel]
 ) -> ConfigError:
-    """Word the first problem of a validation error.
+    """Word the most telling problem of a validation error.
 
     Args:
         error: What pydantic found.
@@ -25,7 +25,8 @@ def config_error(
     Returns:
         The error to raise.
     """
-    first = error.errors()[0]
+    # a mistyped key is missing as well: say what was typed
+    first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     keys = [str(part) for part in first["loc"]]
     where = f"{path}{_line(text, keys)}: " if path is not None else ""
     where += ".".join(keys) or "the whole file"

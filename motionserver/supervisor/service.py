@@ -134,24 +134,27 @@ class Service:
         return self.exit_status
 
     async def _park(self) -> int:
-        """Let the active guard park; the spare goes first, it has nothing to do."""
+        """Let the active guard park; the spare is told too, and parks if its turn comes."""
         active, spare = self._active()
-        active.wanted = spare.wanted = False
-        await spare.end(signal.SIGKILL, 1.0)
+        for guard in (active, spare):
+            guard.wanted = False
+            guard.signal(signal.SIGTERM)
         deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
-        active.signal(signal.SIGTERM)
+        result = 3
         while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
             try:
                 status = await active.ended(left)
             except TimeoutError:
                 break
             if status in (0, 3):
-                return status
-            # it was killed while parking: its successor must park too
-            log.warning("%s ended with %s while parking; starting it again", active.name, status)
-            await active.start("leave")
-        await active.end(signal.SIGKILL, 1.0)
-        return 3
+                result = status
+                break
+            log.warning("%s ended with %s while parking; the other parks", active.name, status)
+            active, spare = spare, active
+            if active.pid is None:
+                await active.start("leave")
+        await asyncio.gather(*(guard.end(signal.SIGKILL, 1.0) for guard in (active, spare)))
+        return result
 
     def _is_not_cued(self) -> bool:
         """A planner that died is replaced once the platform parks: its successor knows nothing."""

@@ -19,6 +19,11 @@ _SLOT: Final = struct.Struct("<QII")
 _ATTEMPTS: Final = 4
 
 
+def _crc(sequence: int, data: bytes) -> int:
+    """Over the sequence as well, so that a torn header is seen."""
+    return crc32(data, crc32(sequence.to_bytes(8, "little")))
+
+
 class MappedFile:
     """One writer, any readers; create it once, before the processes start."""
 
@@ -81,7 +86,7 @@ class MappedFile:
         offset = self._offset(self._sequence & 1)
         body = offset + _SLOT.size
         self._map[body : body + len(data)] = data
-        crc = crc32(data, self._sequence & 0xFFFFFFFF)
+        crc = _crc(self._sequence, data)
         _SLOT.pack_into(self._map, offset, self._sequence, len(data), crc)
 
     def newest_sequence(self) -> int:
@@ -98,7 +103,7 @@ class MappedFile:
                     continue
                 body = self._offset(slot) + _SLOT.size
                 data = self._map[body : body + length]
-                if crc32(data, sequence & 0xFFFFFFFF) == crc:
+                if _crc(sequence, data) == crc:
                     return sequence, data
         return None
 

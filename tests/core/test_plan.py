@@ -15,7 +15,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 def random_plan(seed, count=5):
     rng = np.random.default_rng(seed)
-    times = np.concatenate(([0.0], np.cumsum(rng.uniform(0.01, 1.0, count - 1))))
+    times = np.concatenate(([0.0], np.cumsum(rng.uniform(0.1, 1.0, count - 1))))
     tables = rng.normal(size=(3, count, 6))
     tables[1:, -1] = 0.0
     return Plan(7, 3, 0.25, frozen(times), *(frozen(table) for table in tables))

@@ -31,6 +31,8 @@ class Supervisor:
         self._no_plan_ns = int(patience.plans * plan_period * SECOND)
         self._gap = 2.0 * send_period
         self._paused_ns = 0
+        # after a gap of our own, plans are waited for anew, once: (accepted, resumed) [ns]
+        self._excused = (-1, 0)
         self.inconsistent = ""
         self.astray = False
 
@@ -50,6 +52,8 @@ class Supervisor:
         """
         if gap > self._gap:
             self.device.excuse(now_ns)
+            if self._excused[0] != record.accepted_ns:
+                self._excused = (record.accepted_ns, now_ns)
         happened = set(self._events(record, now_ns, gap)) | wishes
         for event in Event:
             if event in happened:
@@ -107,7 +111,9 @@ class Supervisor:
 
     def _from_source(self, record: GuardRecord, now_ns: int) -> Iterator[Event]:
         source, patience = self.source, self.patience
-        planned = now_ns - record.accepted_ns <= self._no_plan_ns
+        accepted, resumed = self._excused
+        since = resumed if accepted == record.accepted_ns else record.accepted_ns
+        planned = now_ns - since <= self._no_plan_ns
         fresh = source.is_fresh(now_ns)
         if source.status.mode is DriveMode.BYE and fresh:
             yield Event.PARK
@@ -115,12 +121,15 @@ class Supervisor:
             yield Event.TROUBLE
         elif source.driving_for(now_ns) >= patience.fresh:
             yield Event.CUEING
-        if fresh and source.is_paused and planned:
+        pausing = fresh and source.is_paused and planned
+        if pausing:
             self._paused_ns = now_ns
         held = (now_ns - record.since_ns) / SECOND
         # what follows a pause has the patience of a hold that begins when the pause ends
         waited = (now_ns - max(record.since_ns, self._paused_ns)) / SECOND
-        if record.state is State.HOLD and (held > patience.pause or waited > patience.hold):
+        if record.state is State.HOLD and (
+            waited > patience.hold or (pausing and held > patience.pause)
+        ):
             yield Event.HOLD_EXPIRED
         if source.silent_for(now_ns) > patience.silence:
             yield Event.SOURCE_SILENT

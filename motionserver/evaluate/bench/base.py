@@ -1,8 +1,6 @@
 """The emulated base at any frame rate, as a process that logs every datagram with its arrival.
 
-Run as ``python -m motionserver.evaluate.bench.base PORT RATE_HZ LOG PRIORITY``; it ends on
-SIGTERM. A real base has a computer of its own, so this one may ask for SCHED_FIFO, below the
-server's processes; priority 0 asks for nothing.
+Run as ``python -m motionserver.evaluate.bench.base PORT RATE_HZ LOG``; it ends on SIGTERM.
 """
 
 from __future__ import annotations
@@ -14,14 +12,11 @@ from motion_clients.moog_config import MoogConfig
 from motion_clients.moog_emulator import run_emulator
 
 from motionserver.evaluate.bench.processes import say
-from motionserver.telemetry.realtime import take_priority
 
 
 def main(arguments: list[str]) -> int:
     """Be a base until a signal, then say what its judge saw."""
     port, rate_hz, log = int(arguments[0]), float(arguments[1]), Path(arguments[2])
-    priority = int(arguments[3])
-    take_priority(max(priority, 1), priority > 0)
     config = MoogConfig(frame_period=1.0 / rate_hz)
     verdict = run_emulator("127.0.0.1", port, config, log_path=log, on_ready=lambda _: say("ready"))
     say(verdict)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
@@ -26,6 +27,9 @@ class Helper:
         arguments: After it.
         stdout: Where its output goes; a pipe if None, for `ready` and `result`.
         stderr: Where its complaints go; where ours go if None.
+        fifo: Priority for SCHED_FIFO, if permitted: for what has a computer of its own in real
+            life, and must not be what is measured. 0 leaves it as it is.
+        asks: True if it reads lines, see `tell`.
     """
 
     def __init__(
@@ -34,6 +38,8 @@ class Helper:
         *arguments: str,
         stdout: IO[bytes] | int | None = None,
         stderr: IO[bytes] | int | None = None,
+        fifo: int = 0,
+        asks: bool = False,
     ) -> None:
         environment = dict(os.environ)
         # as the service does for its own: a matrix product must not spread over the cores
@@ -43,11 +49,14 @@ class Helper:
         self.module = module
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if asks else subprocess.DEVNULL,
             stdout=subprocess.PIPE if stdout is None else stdout,
             stderr=stderr,
             env=environment,
         )
+        if fifo:
+            with contextlib.suppress(OSError):
+                os.sched_setscheduler(self.process.pid, os.SCHED_FIFO, os.sched_param(fifo))
 
     def __enter__(self) -> Self:
         return self
@@ -59,6 +68,12 @@ class Helper:
         trace: TracebackType | None,
     ) -> None:
         self.end(5.0)
+
+    def tell(self, text: str) -> None:
+        """Send it a line."""
+        if self.process.stdin is not None:
+            self.process.stdin.write(text.encode() + b"\n")
+            self.process.stdin.flush()
 
     def line(self) -> str:
         """Wait for its next line.
@@ -91,8 +106,10 @@ class Helper:
         except subprocess.TimeoutExpired:
             self.process.kill()
         status = self.process.wait()
-        if self.process.stdout is not None:
-            self.process.stdout.close()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
         return status
 
 

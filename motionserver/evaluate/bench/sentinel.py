@@ -25,19 +25,31 @@ class Sentinel(Helper):
         period: Of its grid [s].
         seconds: How long it sleeps [s].
         priority: For SCHED_FIFO, as the process beside it asks for; 0 for none.
+        waits: True: it begins at `go`, not when it is entered.
     """
 
-    def __init__(self, period: float, seconds: float, priority: int) -> None:
+    def __init__(self, period: float, seconds: float, priority: int, waits: bool = False) -> None:
         arguments = (str(round(period * 1e9)), str(seconds), str(priority))
-        super().__init__("motionserver.evaluate.bench.sentinel", *arguments)
+        super().__init__("motionserver.evaluate.bench.sentinel", *arguments, asks=True)
+        self._waits = waits
 
     def __enter__(self) -> Self:
-        """Wait until it sleeps."""
+        """Wait until it is ready, and let it sleep unless it shall wait."""
         self.line()
+        if not self._waits:
+            self.go()
         return self
 
+    def go(self) -> None:
+        """Let it begin."""
+        self.tell("go")
+
+    def late(self) -> Histogram:
+        """Wait for its end and read how late it was."""
+        return Histogram.from_mapping(self.result()["late_bins"])
+
     def row(self, name: str) -> Row:
-        """Wait for its end and read what it saw."""
+        """Wait for its end and read all it saw."""
         seen = self.result()
         counted = Histogram.from_mapping(seen["late_bins"])
         return row_of_histogram(name, counted, missed=seen["missed"], scheduling=seen["scheduling"])
@@ -84,6 +96,7 @@ def main(arguments: list[str]) -> int:
     """Sleep, and tell."""
     period_ns, seconds, priority = int(arguments[0]), float(arguments[1]), int(arguments[2])
     say("ready")
+    sys.stdin.readline()
     say(asyncio.run(sleep_on_grid(period_ns, seconds, priority)))
     return 0
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import socket
 import subprocess
 import tempfile
@@ -24,7 +23,8 @@ RAISING: Final = 40.0
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
 
-BASE_PRIORITY: Final = 20
+OTHERS_PRIORITY: Final = 20
+"""Of base and simulator where the server has SCHED_FIFO: they have computers of their own."""
 
 
 class BenchServer:
@@ -46,6 +46,7 @@ class BenchServer:
         self.cue_port = free_port(socket.SOCK_DGRAM)
         self.web_port = free_port(socket.SOCK_STREAM)
         self.verdict: dict[str, Any] = {}
+        self._fifo = OTHERS_PRIORITY if realtime else 0
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
@@ -54,9 +55,10 @@ class BenchServer:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-")))
             self._folder, self.base_log = folder, folder / "base.log"
             base_port = free_port(socket.SOCK_DGRAM)
-            priority = str(BASE_PRIORITY if self.realtime else 0)
-            arguments = (str(base_port), str(self.rate_hz), str(self.base_log), priority)
-            self._base = stack.enter_context(Helper("motionserver.evaluate.bench.base", *arguments))
+            arguments = (str(base_port), str(self.rate_hz), str(self.base_log))
+            self._base = stack.enter_context(
+                Helper("motionserver.evaluate.bench.base", *arguments, fifo=self._fifo)
+            )
             self._base.line()
             config = folder / "server.toml"
             config.write_text(tomli_w.dumps(self._config(base_port)), "utf-8")
@@ -75,18 +77,23 @@ class BenchServer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Park, end, and hear the judge."""
+        """Park, end, and take everything away."""
         with self._stack:
-            self._server.end(PARKING)
-            self._base.process.send_signal(signal.SIGTERM)
             if kind is None:
-                self.verdict = self._base.result()
+                self.stop()
+
+    def stop(self) -> None:
+        """Park, end, and hear the judge; what was logged stays until the context is left."""
+        if self._server.process.poll() is None:
+            self._server.end(PARKING)
+            self._base.process.terminate()
+            self.verdict = self._base.result()
 
     def replay(self, recording: str) -> Helper:
         """Send a recording round and round, as a simulator would; end it yourself."""
         to = f"127.0.0.1:{self.cue_port}"
         arguments = ("replay", recording, "--to", to, "--loop")
-        return Helper("motionserver", *arguments, stdout=subprocess.DEVNULL)
+        return Helper("motionserver", *arguments, stdout=subprocess.DEVNULL, fifo=self._fifo)
 
     def engage(self) -> None:
         """Raise the platform once a cue comes, and wait until it runs."""
