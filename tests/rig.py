@@ -44,9 +44,17 @@ def free_port(kind: int = socket.SOCK_DGRAM) -> int:
 
 
 def prompt() -> None:
-    """Let the calling thread be punctual where that is permitted: it plays a device."""
+    """Let the calling thread be punctual where that is permitted: it plays a device.
+
+    All threads of the tests' process need it: one that is kept waiting may hold the interpreter.
+    """
     with contextlib.suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(20))
+
+
+def unhurried() -> None:
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def environment() -> dict[str, str]:
@@ -193,9 +201,11 @@ class Rig:
             )
 
     def __enter__(self) -> Self:
+        prompt()
         return self
 
     def __exit__(self, *_: object) -> None:
+        unhurried()
         for _, stop in self._drives:
             stop.set()
         for thread, _ in self._drives:

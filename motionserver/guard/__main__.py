@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import fcntl
+import gc
 import logging
 import signal
 import sys
@@ -13,6 +14,7 @@ from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import read_options
 from motionserver.guard.ports import open_link
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.realtime import take_priority
 
 
 def main() -> int:
@@ -28,9 +30,13 @@ def main() -> int:
     run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
     options = read_options(run_dir)
     link = open_link(descriptor)
+    # before it waits: a spare that must first queue for a busy processor takes over late
+    scheduling = take_priority(50, options.realtime)
+    gc.collect()
+    gc.freeze()
     with (run_dir / "guard.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        loop = GuardLoop(options, run_dir, link)
+        loop = GuardLoop(options, run_dir, link, scheduling)
         signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
         if told or sys.argv[3:] == ["leave"]:
             loop.ask_to_leave("told before its turn came")

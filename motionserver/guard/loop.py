@@ -20,7 +20,6 @@ from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
 from motionserver.guard.snapshot import snapshot
 from motionserver.telemetry.logs import Seldom
-from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
 
@@ -34,7 +33,9 @@ log = logging.getLogger("motionserver.guard")
 class GuardLoop:
     """One guard on one platform."""
 
-    def __init__(self, options: GuardOptions, run_dir: Path, link: socket.socket) -> None:
+    def __init__(
+        self, options: GuardOptions, run_dir: Path, link: socket.socket, scheduling: str
+    ) -> None:
         self.options = options
         self.guard = Guard(options.guard)
         self._ports = Ports(options, run_dir, link, self.guard.record.counters)
@@ -55,7 +56,7 @@ class GuardLoop:
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
         self._start_ns = now_ns()
-        self.scheduling = ""
+        self.scheduling = scheduling
         self._seldom = Seldom(log)
 
     async def run(self) -> int:
@@ -68,10 +69,8 @@ class GuardLoop:
         self._done = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        gc.collect()
         gc.freeze()
         gc.disable()
-        self.scheduling = take_priority(50, self.options.realtime)
         ticker = Ticker(self._wake)
         self._start_ns = now_ns()
         self._last_ns = self._start_ns

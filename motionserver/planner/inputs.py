@@ -137,6 +137,11 @@ class Inputs:
         if self.counters[key] <= SHOWN_ERRORS:
             log.warning("packet refused, %s", text)
 
+    @property
+    def owner_key(self) -> bytes | None:
+        """Key that the owner signs with, and what it is told is signed with; None without."""
+        return None if self.owner_input is None else self.owner_input.options.key
+
     def reply(self, data: bytes) -> None:
         """Send a status to the owner, if its input can answer."""
         owner = self.vehicle.owner

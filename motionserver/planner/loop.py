@@ -208,7 +208,8 @@ class PlannerLoop:
                     rejected=counters["refused"] & 0xFFFFFFFF,
                     scale=self._intake.gain * self._thinker.tuning.scale,
                     state=WireState(STATES.index(state)),
-                )
+                ),
+                self._inputs.owner_key,
             )
         )
         counters["status_sent"] += 1

@@ -50,9 +50,11 @@ class Service:
             ConfigError: Another server runs here, or an address cannot be bound.
         """
         self.run_dir = run_dir
-        self._lock = self._take(run_dir)
-        self._link = open_link(local)
-        try_addresses(resolved["sources"], resolved["web"] if config_web else None)
+        with contextlib.ExitStack() as undo:
+            self._lock = undo.enter_context(self._take(run_dir))
+            self._link = undo.enter_context(open_link(local))
+            try_addresses(resolved["sources"], resolved["web"] if config_web else None)
+            undo.pop_all()
         self.local_port: int = self._link.getsockname()[1]
         web = dict(resolved["web"])
         core = {key: value for key, value in resolved.items() if key != "web"}

@@ -1,8 +1,10 @@
 """SIGKILL of each process in motion: short versions here, twenty of each as a campaign."""
 
+import json
 import os
 import signal
 import struct
+import sys
 import time
 from pathlib import Path
 from random import Random
@@ -160,11 +162,12 @@ def test_twenty_kills_in_motion(tmp_path: Path, name: str) -> None:
         figures = campaign(rig, name, seed=2014)
         assert rig.end() == 0
         verdict = rig.verdict()
+    told = {"kills": len(figures), "violations": verdict["violations"]}
     for key in figures[0]:
         values = sorted(figure[key] for figure in figures)
-        print(name, key, f"median {values[len(values) // 2]:.3f} max {values[-1]:.3f}")
-    print(name, "kills", len(figures), "violations", verdict["violations"])
-    print({k: verdict[k] for k in ("speed_max", "acceleration_max", "jerk_max", "gap_ms")})
+        told[key] = {"median": values[len(values) // 2], "max": values[-1]}
+    told |= {key: verdict[key] for key in ("speed_max", "acceleration_max", "gap_ms")}
     if name == "guard":
-        print("largest jump at a takeover [m]", jump_after_takeover(tmp_path / "base.log"))
+        told["jump_m"] = jump_after_takeover(tmp_path / "base.log")
+    sys.stdout.write(f"\n{name}: {json.dumps(told, indent=2)}\n")
     assert_soft(verdict)
