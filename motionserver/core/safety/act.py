@@ -118,7 +118,7 @@ class Guard:
         if record.state not in CUED or playback is None:
             verdict = Rejection(Reason.NOT_CUEING)
         elif len(playback.pending) >= MOST_PENDING:
-            verdict = Rejection(Reason.WRONG_PARENT)
+            verdict = Rejection(Reason.TOO_EARLY)
         else:
             verdict = accept_proposal(
                 self.machine, proposal, playback.newest, playback.newest_clock, self.homes
