@@ -167,7 +167,7 @@ def test_a_planner_that_talks_nonsense_holds():
     good = b.plan
     b.plan = lambda playback: replace(good(playback), parent_id=12345)
     b.until("HOLD", 1.0)
-    assert b.record.counters["rejected_too-early"] > 0
+    assert b.record.counters["rejected_wrong-parent"] > 0
     assert b.record.rejections[-1][1].reason == "wrong-parent"
 
 
