@@ -85,6 +85,8 @@ class Guard:
                 refusal = (
                     f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
                 )
+            elif request.by == "http" and not request.enabled:
+                refusal = "the enable input is open: somebody at the platform must hold it"
             else:
                 refusal = self.supervisor.refusal(record, now)
                 if not refusal:
