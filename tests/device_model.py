@@ -69,6 +69,7 @@ class Bench:
         self.now = 1_000_000_000_000
         self.ticks = 0
         self.mode = DriveMode.DRIVE
+        self.enabled = True
         self.source = True
         self.planning = True
         self.plan = self._remainder
@@ -115,7 +116,7 @@ class Bench:
                 feedback,
                 CueStatus(self._cue_ns, 150_000_000, self.mode),
                 proposal,
-                tuple(Request(op, by) for op in ops),
+                tuple(Request(op, by, self.enabled) for op in ops),
                 leave,
             )
         )

@@ -26,16 +26,16 @@ MIX = {
     "snatch": 0.04,
     "dash": 0.03,
     "far": 0.01,
-    "stranded": 0.06,
-    "swung": 0.06,
+    "stranded": 0.07,
+    "swung": 0.065,
     "singular": 0.06,
-    "discontinuous": 0.09,
+    "discontinuous": 0.085,
     "unstoppable": 0.09,
     "not finite": 0.08,
     "malformed": 0.08,
     "wrong parent": 0.08,
     "late": 0.08,
-    "early": 0.03,
+    "early": 0.02,
 }
 _KINDS = tuple(MIX)
 

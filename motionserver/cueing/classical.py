@@ -19,6 +19,7 @@ from motionserver.cueing.base import Candidate, Report
 from motionserver.cueing.channels import minus
 from motionserver.cueing.filters import Block, Corner, FilterSet, discretise, high_pass
 from motionserver.cueing.horizon import make_grid
+from motionserver.cueing.reference import believable
 from motionserver.cueing.rotation import RotationPart
 from motionserver.cueing.stopping import STOP_TIME, with_stop
 from motionserver.cueing.tuning import Tuning
@@ -81,13 +82,14 @@ class Classical:
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus
     ) -> Candidate | None:
         """Lay out the filters' answer; see `Cueing.propose`."""
-        if not (np.isfinite(stimulus.force).all() and np.isfinite(stimulus.rates).all()):
+        believed = believable(stimulus)
+        if believed is None:
             self._report = Report(frozen(self._machine.box), 0, "not finite")
             return None
         tuning = self._tuning
-        force = tuning.gain * stimulus.force
+        force = tuning.gain * believed.force
         rotation = self._rotation.ahead(
-            parent, takeover, self._piece_share[:, None] * self._rates(stimulus.rates), STOP_TIME
+            parent, takeover, self._piece_share[:, None] * self._rates(believed.rates), STOP_TIME
         )
         tilt_only = minus(start, self._rotation.at(parent, takeover))
         now = np.stack((tilt_only.pose, tilt_only.velocity, tilt_only.acceleration))
@@ -104,9 +106,6 @@ class Classical:
         pose, velocity = pose + rotation[1], velocity + rotation[2]
         acceleration = acceleration + rotation[3]
         pose[0], velocity[0], acceleration[0] = start.pose, start.velocity, start.acceleration
-        if not np.isfinite(pose).all():
-            self._report = Report(frozen(self._machine.box), 0, "not finite")
-            return None
         self._report = Report(
             frozen(self._machine.box),
             numbers={"wanted_x": float(force[0]), "wanted_y": float(force[1])},

@@ -78,11 +78,12 @@ class PaperHalving:
     def settle(self, poses: Array, start: PlatformState, box: Array, trouble: bool) -> None:
         """YES: X_max <- (X_max + X_M)/2 (7). NO: X_max <- (X_max + |X(k)|)/2 (8)."""
         last = poses[-1:]
-        excess, pull = _worst(self._machine, last)
         opened = 0.5 * (self.x_max + box)
+        excess, row, leg, side = _worst(self._machine, last)
         if excess <= 0.0:
             self.x_max = opened
             return
+        pull = _pull(self._machine, last[row], leg, side)
         halved = np.maximum(0.5 * (self.x_max + np.abs(last[0])), stopping_reach(start))
         self.x_max = np.minimum(np.where(pull > 0.0, halved, opened), box)
 
@@ -102,10 +103,11 @@ class SoundHalving:
 
     def settle(self, poses: Array, start: PlatformState, box: Array, trouble: bool) -> None:
         """Close where a leg ends, open elsewhere; see the class."""
-        excess, pull = _worst(self._machine, poses)
+        excess, row, leg, side = _worst(self._machine, poses)
         if excess <= 0.0 and not trouble:
             self.x_max = self.x_max + self._open * (box - self.x_max)
             return
+        pull = _pull(self._machine, poses[row], leg, side)
         reached = np.max(np.abs(poses), axis=0)
         share = 1.0 - min(0.5, max(excess, 0.002) / max(float(np.sum(np.maximum(pull, 0.0))), 0.02))
         goal = np.where(pull > 0.0, share * np.minimum(reached, self.x_max), self.x_max)
@@ -119,12 +121,17 @@ def stopping_reach(start: PlatformState) -> Array:
     return np.abs(start.pose) + start.velocity**2 / (2.0 * STOP_RATE)
 
 
-def _worst(machine: Machine, poses: Array) -> tuple[float, Array]:
-    """How far the worst leg is outside [m] and each axis' share in it [m], (6,)."""
+def _worst(machine: Machine, poses: Array) -> tuple[float, int, int, float]:
+    """How far the worst leg is outside [m], in which pose, which leg, +1 too long, -1 too short."""
     lengths = leg_lengths(machine, poses)
     over, under = lengths - machine.leg_max, machine.leg_min - lengths
     beyond = np.maximum(over, under)
     row, leg = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
     side = 1.0 if over[row, leg] >= under[row, leg] else -1.0
-    pull = side * jacobian(machine, poses[row : row + 1])[0, leg] * poses[row]
-    return float(beyond[row, leg]), pull
+    return float(beyond[row, leg]), int(row), int(leg), side
+
+
+def _pull(machine: Machine, pose: Array, leg: int, side: float) -> Array:
+    """Each axis' share in how far a leg is from neutral towards one end, (6,) [m]."""
+    pull: Array = side * jacobian(machine, pose[None])[0, leg] * pose
+    return pull

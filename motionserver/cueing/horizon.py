@@ -34,7 +34,7 @@ class Grid:
     node_share: Array
 
 
-def make_grid(horizon: float, period: float, finest: float = 0.03, node: float = 0.16) -> Grid:
+def make_grid(horizon: float, period: float, finest: float = 0.04, node: float = 0.22) -> Grid:
     """Cut a horizon into pieces: two of one period, then growing evenly.
 
     Args:

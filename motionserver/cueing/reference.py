@@ -32,8 +32,32 @@ AR_REST_FADE: Final = 0.2
 """How fast what the low-pass took away fades [s]."""
 LARGEST: Final = 8.0
 """Bound of a forecast force [m/s2]."""
+LARGEST_FORCE: Final = 50.0
+"""More than this is believed of no stimulus [m/s2]."""
+LARGEST_RATE: Final = 10.0
+"""The same of body rates [rad/s]."""
 
 _FADES: Final = {"constant": np.inf, "fade": FORCE_FADE, "ar": np.inf}
+
+
+def believable(stimulus: Stimulus) -> Stimulus | None:
+    """The stimulus within bounds, a preview with holes left out; None if it is not a number.
+
+    Filters remember: one wild number would be felt for seconds.
+    """
+    if not (np.isfinite(stimulus.force).all() and np.isfinite(stimulus.rates).all()):
+        return None
+    preview = stimulus.preview
+    if preview is not None:
+        tables = (preview.times, preview.force, preview.rates)
+        if not all(np.isfinite(table).all() for table in tables):
+            preview = None
+    return Stimulus(
+        np.clip(stimulus.force, -LARGEST_FORCE, LARGEST_FORCE),
+        np.clip(stimulus.rates, -LARGEST_RATE, LARGEST_RATE),
+        stimulus.gain,
+        preview,
+    )
 
 
 class Reference:

@@ -83,6 +83,9 @@ class RotationPart:
         new = self._candidate if kappa > 0.0 else None
         if old is None and new is None:
             return
+        if new is not None and kappa == 1.0 and len(new.times) == len(plan.times):
+            self._remember(plan.plan_id, new)
+            return
         still = np.zeros((len(plan.times), 6))
         before = still, still, still
         if old is not None:
@@ -93,8 +96,10 @@ class RotationPart:
         pose, velocity, acceleration = (
             frozen(a + kappa * (b - a)) for a, b in zip(before, after, strict=True)
         )
-        self._parts[plan.plan_id] = Plan(
-            plan.plan_id, plan.parent_id, plan.takeover, plan.times, pose, velocity, acceleration
-        )
+        blended = Plan(0, 0, plan.takeover, plan.times, pose, velocity, acceleration)
+        self._remember(plan.plan_id, blended)
+
+    def _remember(self, plan_id: int, part: Plan) -> None:
+        self._parts[plan_id] = part
         while len(self._parts) > REMEMBERED:
             self._parts.popitem(last=False)

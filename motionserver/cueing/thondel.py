@@ -21,7 +21,7 @@ from motionserver.cueing.channels import CHANNELS, minus
 from motionserver.cueing.filters import filter_set
 from motionserver.cueing.halving import Halving, make_halving
 from motionserver.cueing.horizon import make_grid
-from motionserver.cueing.reference import Reference
+from motionserver.cueing.reference import Reference, believable
 from motionserver.cueing.rotation import RotationPart
 from motionserver.cueing.stopping import STOP_TIME, with_stop
 from motionserver.cueing.thondel_plant import make_plant, stacked_state
@@ -124,14 +124,12 @@ class Thondel:
     ) -> Candidate | None:
         """Solve for the inputs and lay out the filters' answer; see `Cueing.propose`."""
         self._pending = None
-        if not (np.isfinite(stimulus.force).all() and np.isfinite(stimulus.rates).all()):
+        believed = believable(stimulus)
+        if believed is None:
             self._say("not finite", 0)
             return None
-        wanted = self._reference.predict(stimulus)
-        wanted[:, 5] = self._onset_of_yaw(wanted[:, 5], float(stimulus.rates[2]))
-        if not np.isfinite(wanted).all():
-            self._say("not finite", 0)
-            return None
+        wanted = self._reference.predict(believed)
+        wanted[:, 5] = self._onset_of_yaw(wanted[:, 5], float(believed.rates[2]))
         rates = self._to_pieces @ wanted[:, 3:] * self._tuning.rotation_gain
         # yaw is a channel of its own here
         rates[:, 2] = 0.0

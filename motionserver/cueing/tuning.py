@@ -56,7 +56,7 @@ class Tuning:
     weight_change: float = 0.02
     weight_position: float = 2.8
     filters: str = "standard"
-    reference: str = "constant"
+    reference: str = "ar"
     legs: bool = True
     halving: str = "sound"
     backend: str = "daqp"

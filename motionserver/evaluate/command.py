@@ -70,6 +70,8 @@ def evaluate(
     base = tuning or Tuning()
     base = base if scale is None else replace(base, scale=scale)
     _check(algorithms, base.scale, rate, planner_hz, setpoints)
+    for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
+        _check_folder(option, path)
     recording = read_recording(input_csv)
 
     def tell(text: str) -> None:
@@ -152,4 +154,12 @@ def _check(
             "--setpoints",
             f"one algorithm moves one platform; {len(algorithms)} are given",
             "Give exactly one name to --algorithm.",
+        )
+
+
+def _check_folder(option: str, path: str | Path | None) -> None:
+    """Refuse before minutes of work what could not be written after them."""
+    if path is not None and (not Path(path).parent.is_dir() or Path(path).is_dir()):
+        raise ConfigError(
+            f"{option} {path}", "is no file in an existing folder", "Name a file to write."
         )

@@ -81,7 +81,7 @@ def find_yardstick(
             # a tie goes to the smaller gain, whatever the order of trial
             if best is None or (tried[gain], gain) < (tried[best_gain], best_gain):
                 best, best_gain = driven, gain
-        if tell is not None:
+        if tell is not None and gains:
             tell(f"yardstick: gain {best_gain:g}, RMSE(x, y) {tried[best_gain]:.4f} m/s2")
     assert best is not None
     return Yardstick(best_gain, replace(best, name="yardstick"), tuple(sorted(tried.items())))

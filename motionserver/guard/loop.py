@@ -115,7 +115,9 @@ class GuardLoop:
             feedback=self._ports.feedback(),
             cue=self._ports.cue(),
             proposal=self._ports.proposal(),
-            requests=tuple(_request(message) for message, _ in requests),
+            requests=tuple(
+                as_request(message, self.options.enable_input) for message, _ in requests
+            ),
             leave=self._leave,
         )
         if given.gap > 1.5e-9 * self._tick_ns:
@@ -184,7 +186,14 @@ class GuardLoop:
             self._done.set_result(3)
 
 
-def _request(message: dict[str, Any]) -> Request:
+def as_request(message: dict[str, Any], enable_input: Path | None) -> Request:
     """An edge; a word that is none is not kept, so that nobody can fill the counters with words."""
     op = message["op"] if message["op"] in ("engage", "park", "reset") else "unknown"
-    return Request(op, str(message.get("by", "console"))[:20])
+    enabled = True
+    if op == "engage" and enable_input is not None:
+        try:
+            with enable_input.open("rb") as file:
+                enabled = file.read(16).strip() == b"1"
+        except OSError:
+            enabled = False
+    return Request(op, str(message.get("by", "console"))[:20], enabled)

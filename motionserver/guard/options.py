@@ -23,6 +23,7 @@ class GuardOptions:
         peer: Address of the platform.
         rate_hz: Packets per second [Hz].
         unchecked: Names of limits that the machine's file does not state.
+        enable_input: File that reads 1 while engaging by the page is allowed; None = no input.
         realtime: True: ask for real-time scheduling.
     """
 
@@ -32,6 +33,7 @@ class GuardOptions:
     peer: tuple[str, int]
     rate_hz: float
     unchecked: tuple[str, ...]
+    enable_input: Path | None
     realtime: bool
 
 
@@ -54,5 +56,6 @@ def read_options(run_dir: Path) -> GuardOptions:
         peer=(platform["host"], platform["port"]),
         rate_hz=platform["rate_hz"],
         unchecked=tuple(data["unchecked"]),
+        enable_input=Path(data["enable_input"]) if data["enable_input"] else None,
         realtime=data["realtime"],
     )

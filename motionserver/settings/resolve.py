@@ -66,6 +66,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         "unchecked": unchecked_limits(machine),
         "engage": config.operator.engage,
         "dry_run": dry_run,
+        "enable_input": config.operator.enable_input,
         "realtime": config.server.realtime,
         "platform": {
             "format": platform.format,

@@ -62,6 +62,10 @@ def _weight(default: float, low: float, high: float, label: str, meaning: str, m
     )
 
 
+_START: Final = Tuning()
+"""Where the defaults stand; here only those are written again that have other units."""
+
+
 class TuningModel(BaseModel):
     """Everything that may change while the platform moves. Hard limits are not here."""
 
@@ -69,20 +73,20 @@ class TuningModel(BaseModel):
 
     # fmt: off
     algorithm: Annotated[str, AfterValidator(_known)] = choice(
-        "thondel2014", group="Feel", label="Algorithm", meaning="What turns motion into plans."
+        _START.algorithm, group="Feel", label="Algorithm", meaning="What turns motion into plans."
     )
     scale: float = number(
-        0.6, 0.0, 1.0, "", group="Feel", label="Scale",
+        _START.scale, 0.0, 1.0, "", group="Feel", label="Scale",
         meaning="Share of the vehicle's forces and turn rates that is wanted at all.",
         more="stronger motion, limits reached sooner",
     )
     gain: float = number(
-        0.7, 0.0, 1.0, "", group="Feel", label="Washout gain",
+        _START.gain, 0.0, 1.0, "", group="Feel", label="Washout gain",
         meaning="Gain of the classical washout, on top of the scale.",
         more="stronger motion; no effect on the MPC",
     )
     rotation_gain: float = number(
-        1.0, 0.0, 1.0, "", group="Feel", label="Rotation gain",
+        _START.rotation_gain, 0.0, 1.0, "", group="Feel", label="Rotation gain",
         meaning="Share of the vehicle's own roll, pitch and yaw rate that is shown.",
         more="livelier turning, less tilt left for sustained forces",
     )
@@ -98,7 +102,8 @@ class TuningModel(BaseModel):
         more="quicker onset of tilt",
     )
     tilt_acceleration_weight: float = number(
-        0.0, 0.0, 1000.0, "", group="Perception", label="Tilt acceleration weight",
+        _START.tilt_acceleration_weight, 0.0, 1000.0, "", group="Perception",
+        label="Tilt acceleration weight",
         meaning="Price of exceeding that threshold; 0 leaves it out.",
         more="smoother, later tilt",
     )
@@ -114,12 +119,12 @@ class TuningModel(BaseModel):
     box_pitch_deg: float = _box("pitch", 16.3, 45.0, "deg")
     box_yaw_deg: float = _box("yaw", 17.5, 45.0, "deg")
     halving: Literal["off", "paper", "sound"] = choice(
-        "sound", group="Workspace", label="Interval halving",
+        _START.halving, group="Workspace", label="Interval halving",
         meaning="How position limits shrink until the legs agree: off, as printed in the paper, "
         "or sound.",
     )
     legs: bool = choice(
-        True, group="Workspace", label="Leg rows",
+        _START.legs, group="Workspace", label="Leg rows",
         meaning="Leg lengths inside the optimiser; off is the paper's box-only form.",
     )
     horizon_s: float = number(
@@ -128,32 +133,33 @@ class TuningModel(BaseModel):
         more="earlier braking before limits, more computing time",
     )
     weight_force: float = _weight(
-        1.0, 0.001, 100.0, "Force weight", "Price of a wrong specific force.",
+        _START.weight_force, 0.001, 100.0, "Force weight", "Price of a wrong specific force.",
         "closer to the wanted force, more travel",
     )
     weight_input: float = _weight(
-        0.02, 0.0, 100.0, "Input weight", "Price of the washout's input leaving the reference.",
+        _START.weight_input, 0.0, 100.0, "Input weight",
+        "Price of the washout's input leaving the reference.",
         "closer to plain washout",
     )
     weight_change: float = _weight(
-        0.02, 0.0, 100.0, "Change weight", "Price of changing the input.",
+        _START.weight_change, 0.0, 100.0, "Change weight", "Price of changing the input.",
         "smoother, softer onset",
     )
     weight_position: float = _weight(
-        0.5, 0.0, 100.0, "Position weight", "Price of being away from neutral.",
+        _START.weight_position, 0.0, 100.0, "Position weight", "Price of being away from neutral.",
         "sooner back at neutral, weaker cues",
     )
     filters: Literal["standard", "fig3"] = choice(
-        "standard", group="Optimiser", label="Filters",
+        _START.filters, group="Optimiser", label="Filters",
         meaning="Filter set of the washout; fig3 is that of the paper's figure 3.",
     )
     reference: Literal["constant", "fade", "ar"] = choice(
-        "constant", group="Optimiser", label="Reference",
+        _START.reference, group="Optimiser", label="Reference",
         meaning="What surge and sway are expected to do next: stay, fade, or follow a fitted "
         "autoregressive model.",
     )
     backend: Literal["daqp", "osqp", "piqp"] = choice(
-        "daqp", group="Optimiser", label="Solver",
+        _START.backend, group="Optimiser", label="Solver",
         meaning="Which solver computes the quadratic programme.",
     )
     # fmt: on

@@ -61,7 +61,11 @@ class Osqp:
         x = np.asarray(result.x, dtype=np.float64)
         if solved and np.isfinite(x).all():
             return QpResult(x, QpStatus.SOLVED, iterations)
-        if status == osqp.SolverStatus.OSQP_MAX_ITER_REACHED and np.isfinite(x).all():
+        cut_short = (
+            osqp.SolverStatus.OSQP_MAX_ITER_REACHED,
+            osqp.SolverStatus.OSQP_SOLVED_INACCURATE,
+        )
+        if status in cut_short and np.isfinite(x).all():
             return QpResult(x, QpStatus.BUDGET, iterations)
         self._solver = None
         infeasible = status in (

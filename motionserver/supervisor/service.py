@@ -123,6 +123,7 @@ class Service:
         watcher = asyncio.create_task(self._show())
         await self._leave.wait()
         log.info("parking")
+        self.planner.wanted = self.web.wanted = False
         self.exit_status = await self._park()
         watcher.cancel()
         await asyncio.gather(

@@ -32,7 +32,7 @@ class WebConfig:
         machine: `machine_to_mapping` of the machine in use.
         allowed_hosts: Names this server may be asked under, beside its own address.
         engage: "local" = never by HTTP; "http" = by HTTP where `engage_refusal` agrees.
-        enable_input: True if the platform has a configured enable input the guard reads.
+        enable_input: True if an enable input is configured; the guard reads it at each engage.
         tls_cert: Certificate chain, PEM.
         tls_key: Its key, PEM.
     """

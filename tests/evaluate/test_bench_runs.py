@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from motionserver.evaluate.bench import command
-from motionserver.evaluate.bench.latency import ages, first_changes, loopback_floor
+from motionserver.evaluate.bench.latency import ages, bench_latency, first_changes, loopback_floor
 from motionserver.evaluate.bench.loop import bench_loop
 from motionserver.evaluate.bench.plan import DEFAULT, headline, plan_cases
 from motionserver.evaluate.bench.plan_steps import PERIOD, time_plans
@@ -40,13 +40,19 @@ def test_a_process_that_says_nothing_is_an_error(capfd):
     assert "ValueError" in capfd.readouterr().err
 
 
-@pytest.mark.timeout(120)
+@pytest.mark.timeout(240)
 def test_lateness_of_a_real_server_idle_and_loaded():
-    rows = bench_loop(1.0, rates_hz=(60.0,))
-    assert len(rows) == 16
+    rows = bench_loop(1.0, rates_hz=(60.0,), realtime=(False,))
+    assert len(rows) == 8
     for row in rows:
         assert_sound(row)
-    assert sum("HTTP requests/s" in row.notes for row in rows) == 2
+    assert sum("HTTP requests/s" in row.notes for row in rows) == 1
+
+
+@pytest.mark.timeout(240)
+def test_latency_of_a_real_server():
+    for row in bench_latency(2.0):
+        assert_sound(row)
 
 
 def test_every_case_of_the_plan_benchmark_runs():

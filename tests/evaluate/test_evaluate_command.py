@@ -148,6 +148,8 @@ def test_progress_goes_to_standard_error(short, tmp_path, capsys):
         ({"scale": float("nan")}, "--scale"),
         ({"rate": 5.0}, "--rate: 5 Hz"),
         ({"planner_hz": 1000.0}, "--planner-rate"),
+        ({"json_out": "nowhere/figures.json"}, "--json nowhere.*no file in an existing folder"),
+        ({"html_out": "."}, "--html"),
         ({"algorithms": ["classical", "thondel2014"], "setpoints": "x.csv"}, "--setpoints"),
     ],
 )

@@ -53,22 +53,22 @@ def jacobian(machine: Machine, poses: Array) -> Array:
     Returns:
         J_E with l' = J_E q', (N, 6 legs, 6 axes).
     """
-    out, _ = _jacobian(machine, poses)
+    out = _jacobian(machine, poses)
     out[..., 3:] = np.matmul(out[..., 3:], euler_rate_matrix(poses[:, 3:]))
     return out
 
 
-def _jacobian(machine: Machine, poses: Array) -> tuple[Array, Array]:
-    """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes; and leg lengths."""
+def _jacobian(machine: Machine, poses: Array) -> Array:
+    """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes, (N, 6, 6)."""
     legs, arms = leg_vectors(machine, poses)
-    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
     rows = np.empty((len(poses), 6, 6))
-    rows[..., :3] = unit = legs / lengths[..., None]
+    unit = legs / np.sqrt(np.einsum("nij,nij->ni", legs, legs))[..., None]
+    rows[..., :3] = unit
     # written out: np.cross costs several times the arithmetic at these sizes
     rows[..., 3] = arms[..., 1] * unit[..., 2] - arms[..., 2] * unit[..., 1]
     rows[..., 4] = arms[..., 2] * unit[..., 0] - arms[..., 0] * unit[..., 2]
     rows[..., 5] = arms[..., 0] * unit[..., 1] - arms[..., 1] * unit[..., 0]
-    return rows, lengths
+    return rows
 
 
 def leg_motion(
@@ -154,7 +154,7 @@ def is_conditioned(machine: Machine, poses: Array, least: float) -> bool:
 
 def _scaled_jacobian(machine: Machine, poses: Array) -> Array:
     radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
-    rows, _ = _jacobian(machine, poses)
+    rows = _jacobian(machine, poses)
     rows[..., 3:] /= radius
     return rows
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.core.limits import Machine
-from motionserver.core.motion.moves import rest_to_rest, straight_way
+from motionserver.core.motion.moves import rest_to_rest, straight_way, straight_ways
 from motionserver.core.plan import Plan, rest_at
 from motionserver.core.safety.shape import well_formed
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
@@ -123,4 +123,4 @@ def accept_move(
 
 
 def _home_bound(machine: Machine, rest: Array, homes: Array) -> float:
-    return max(straight_way(machine, rest, home).duration for home in homes)
+    return max(way.duration for way in straight_ways(machine, rest, homes))

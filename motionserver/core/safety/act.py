@@ -85,6 +85,8 @@ class Guard:
                 refusal = (
                     f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
                 )
+            elif request.by == "http" and not request.enabled:
+                refusal = "the enable input is open: somebody at the platform must hold it"
             else:
                 refusal = self.supervisor.refusal(record, now)
                 if not refusal:
@@ -118,7 +120,7 @@ class Guard:
         if record.state not in CUED or playback is None:
             verdict = Rejection(Reason.NOT_CUEING)
         elif len(playback.pending) >= MOST_PENDING:
-            verdict = Rejection(Reason.WRONG_PARENT)
+            verdict = Rejection(Reason.TOO_EARLY)
         else:
             verdict = accept_proposal(
                 self.machine, proposal, playback.newest, playback.newest_clock, self.homes

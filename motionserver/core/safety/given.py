@@ -33,10 +33,17 @@ class GuardConfig:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """An operator's edge: engage, park or reset; and by which way it came."""
+    """An operator's edge.
+
+    Attributes:
+        op: "engage", "park" or "reset".
+        by: By which way it came: "console" or "http".
+        enabled: False if an enable input is configured and somebody there does not hold it.
+    """
 
     op: str
     by: str
+    enabled: bool = True
 
 
 @dataclass(frozen=True, slots=True)

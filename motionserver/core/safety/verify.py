@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import (
@@ -18,7 +17,7 @@ from motionserver.core.kinematics.hexapod import (
     neutral_conditioning,
 )
 from motionserver.core.limits import Machine
-from motionserver.core.motion.moves import straight_way
+from motionserver.core.motion.moves import straight_ways
 from motionserver.core.plan import MAX_DURATION, Plan
 from motionserver.core.safety.shape import continues, well_formed
 from motionserver.core.safety.verdict import Reason, Rejection
@@ -33,8 +32,7 @@ LONGEST_MOVE: Final = 60.0
 """Longest rest-to-rest move [s]."""
 
 _DOUBTFUL: Final = 0.65
-_SWING_EVERY: Final = 10
-_CONDITIONING_EVERY: Final = 25
+_POSTURE_EVERY: Final = 16
 _WAY_EVERY: Final = 4
 
 
@@ -137,19 +135,19 @@ def check_legs(
         largest, allowed = float(size.max()), machine.passenger_acceleration * margins.share
         if largest > allowed:
             return Rejection(Reason.PASSENGER, at(int(size.argmax()) + 2), None, largest, allowed)
-    return _check_posture(machine, poses, margins, (_SWING_EVERY, _CONDITIONING_EVERY), at)
+    return _check_posture(machine, poses, margins, _POSTURE_EVERY, at)
 
 
 def _check_posture(
     machine: Machine,
     poses: Array,
     margins: Margins,
-    every: tuple[int, int],
+    every: int,
     at: Callable[[int], float | None],
 ) -> Rejection | None:
     """Joint angles and conditioning at some of the poses (N, 6), the last one included."""
+    rows = np.append(np.arange(0, len(poses), every), len(poses) - 1)
     if machine.joint_angle is not None:
-        rows = _thinned(len(poses), every[0])
         swing = joint_angles(machine, poses[rows])
         largest, allowed = float(swing.max()), machine.joint_angle - margins.swing
         if largest > allowed:
@@ -157,17 +155,12 @@ def _check_posture(
             when = at(int(rows[row]))
             return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
     if machine.conditioning is not None:
-        rows = _thinned(len(poses), every[1])
         allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
         if not is_conditioned(machine, poses[rows], allowed):
             found = conditioning(machine, poses[rows])
             when = at(int(rows[found.argmin()]))
             return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None
-
-
-def _thinned(count: int, every: int) -> NDArray[np.intp]:
-    return np.append(np.arange(0, count, every), count - 1)
 
 
 def _fine_jerk(
@@ -198,7 +191,7 @@ def check_ways_home(
     machine: Machine, rest: Array, homes: Array, margins: Margins
 ) -> Rejection | None:
     """From the rest pose (6,) a straight, allowed way to each of the poses ``homes`` (H, 6)."""
-    ways = [straight_way(machine, rest, home) for home in homes]
+    ways = straight_ways(machine, rest, homes)
     low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
     for way in ways:
         beyond = max(low - float(way.legs.min()), float(way.legs.max()) - high)
@@ -207,7 +200,7 @@ def check_ways_home(
         if way.duration > LONGEST_MOVE:
             return Rejection(Reason.NO_WAY_HOME, None, None, way.duration, LONGEST_MOVE)
     poses = np.concatenate([way.poses for way in ways])
-    posture = _check_posture(machine, poses, margins, (_WAY_EVERY, _WAY_EVERY), lambda row: None)
+    posture = _check_posture(machine, poses, margins, _WAY_EVERY, lambda row: None)
     if posture is not None:
         return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
     return None

@@ -8,6 +8,7 @@ import subprocess
 import tempfile
 import time
 from contextlib import ExitStack
+from math import ceil
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -18,13 +19,14 @@ from motionserver.evaluate.bench.processes import BenchError, Helper, free_port,
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.requests import RequestError, ask
 
-RAISING: Final = 40.0
+RAISING: Final = 30.0
 """Longest wait for the platform to run [s]."""
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
 
+FASTEST_PLANNER_HZ: Final = 120.0
 OTHERS_PRIORITY: Final = 20
-"""Of base and simulator where the server has SCHED_FIFO: they have computers of their own."""
+"""For SCHED_FIFO of base and simulator, if permitted: they have computers of their own."""
 
 
 class BenchServer:
@@ -35,6 +37,7 @@ class BenchServer:
         realtime: Whether its processes ask for SCHED_FIFO.
 
     Attributes:
+        plan_hz: Plans per second that are due at this rate [Hz].
         cue_port: UDP port of the cue.
         web_port: TCP port of the page.
         base_log: What the base received, with instants.
@@ -43,10 +46,10 @@ class BenchServer:
 
     def __init__(self, rate_hz: float, realtime: bool) -> None:
         self.rate_hz, self.realtime = rate_hz, realtime
+        self.plan_hz = rate_hz / ceil(rate_hz / FASTEST_PLANNER_HZ)
         self.cue_port = free_port(socket.SOCK_DGRAM)
         self.web_port = free_port(socket.SOCK_STREAM)
         self.verdict: dict[str, Any] = {}
-        self._fifo = OTHERS_PRIORITY if realtime else 0
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
@@ -57,7 +60,7 @@ class BenchServer:
             base_port = free_port(socket.SOCK_DGRAM)
             arguments = (str(base_port), str(self.rate_hz), str(self.base_log))
             self._base = stack.enter_context(
-                Helper("motionserver.evaluate.bench.base", *arguments, fifo=self._fifo)
+                Helper("motionserver.evaluate.bench.base", *arguments, fifo=OTHERS_PRIORITY)
             )
             self._base.line()
             config = folder / "server.toml"
@@ -93,24 +96,33 @@ class BenchServer:
         """Send a recording round and round, as a simulator would; end it yourself."""
         to = f"127.0.0.1:{self.cue_port}"
         arguments = ("replay", recording, "--to", to, "--loop")
-        return Helper("motionserver", *arguments, stdout=subprocess.DEVNULL, fifo=self._fifo)
+        return Helper("motionserver", *arguments, stdout=subprocess.DEVNULL, fifo=OTHERS_PRIORITY)
 
     def engage(self) -> None:
-        """Raise the platform once a cue comes, and wait until it runs."""
+        """Raise the platform once a cue comes, and wait until it runs; a fault is reset.
+
+        Raises:
+            BenchError: It does not run in time.
+        """
         deadline = time.monotonic() + RAISING
-        reason = "no cue has come"
-        while time.monotonic() < deadline:
-            try:
-                request = {"op": "engage", "by": "console"}
-                answer = ask(self._folder / "run" / "guard.sock", request)
-                if answer["ok"]:
-                    self._until("RUN", RAISING)
-                    return
-                reason = str(answer["reason"])
-            except RequestError as error:
-                reason = str(error)
+        state, reason = "", "no cue has come"
+        while time.monotonic() < deadline and self._server.process.poll() is None:
+            state = str(self.guard().get("state"))
+            if state == "RUN":
+                return
+            # a busy computer may let the emulated base starve while it rises
+            op = {"PARKED": "engage", "FAULT": "reset"}.get(state)
+            if op is not None:
+                try:
+                    request = {"op": op, "by": "console"}
+                    reason = str(ask(self._folder / "run" / "guard.sock", request)["reason"])
+                except RequestError as error:
+                    reason = str(error)
             time.sleep(0.1)
-        raise BenchError(f"bench: the platform cannot be engaged ({reason}); {self._tail()}")
+        raise BenchError(
+            f"bench: the platform does not run ({state}: {reason}) within {RAISING:g} s; "
+            f"{self._tail()}"
+        )
 
     def guard(self) -> dict[str, Any]:
         """The guard's newest snapshot."""
@@ -155,5 +167,6 @@ class BenchServer:
             },
             "platform": {"port": base_port, "local_port": 0, "rate_hz": float(self.rate_hz)},
             "sources": [{"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}],
+            "cueing": {"rate_max_hz": FASTEST_PLANNER_HZ},
             "web": {"port": self.web_port},
         }

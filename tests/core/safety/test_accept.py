@@ -105,3 +105,7 @@ def test_moves():
     assert accept_move(hasty, STANDING, 0.01, goal, 5, HOMES).reason is Reason.LEG_SPEED
     slow = replace(compact(), pace=replace(compact().pace, speed=1e-3))
     assert accept_move(slow, STANDING, 0.01, goal, 5, HOMES).reason is Reason.MALFORMED
+
+
+def test_what_verification_refuses_is_not_accepted():
+    assert reason(proposal(goal=(0.5, 0.0, 0.0, 0.0, 0.0, 0.0))) is Reason.LEG_LENGTH
