@@ -46,7 +46,7 @@ def test_the_processes_may_have_the_priorities_they_ask_for(service):
     root = UNIT.parents[1] / "motionserver"
     asked = [
         int(found)
-        for file in ("guard/loop.py", "planner/loop.py")
+        for file in ("guard/__main__.py", "planner/loop.py")
         for found in re.findall(r"take_priority\((\d+)", (root / file).read_text("utf-8"))
     ]
     assert len(asked) == 2
