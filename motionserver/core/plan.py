@@ -16,6 +16,11 @@ MAX_DURATION: Final = 4.0
 MAX_KNOTS: Final = 256
 """Most knots of a plan."""
 
+FIRST_STEP: Final = 1e-4
+"""Least time from a hand-over to the next knot [s]."""
+KNOT_STEP: Final = 0.008
+"""Least time between later knots [s]: every quintic shows at four samples of the 2 ms grid."""
+
 _HEADER: Final = struct.Struct("<QQdII")
 
 

@@ -42,7 +42,7 @@ class VehicleMotion:
         arrival_ns: When it arrived here, CLOCK_MONOTONIC [ns].
         session: Number the sender chose for its run; a new one means a new drive.
         sequence: Counter of the sender, or None if its format has none.
-        simulation_ns: The simulator's own time [ns], or None if its format has none.
+        sender_ns: The sender's own steady clock [ns], or None if its format has none.
         force: Specific force at the sent point, gravity included, (3,) [m/s2].
         rates: Body rates, (3,) [rad/s].
         speed: Forward speed [m/s].
@@ -54,7 +54,7 @@ class VehicleMotion:
     arrival_ns: int
     session: int
     sequence: int | None
-    simulation_ns: int | None
+    sender_ns: int | None
     force: Array
     rates: Array
     speed: float = 0.0

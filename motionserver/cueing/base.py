@@ -8,6 +8,7 @@ from typing import Protocol
 from motionserver.core.axes import Array
 from motionserver.core.plan import Plan
 from motionserver.core.state import PlatformState, Stimulus
+from motionserver.cueing.tuning import Tuning
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +51,15 @@ class Cueing(Protocol):
     The planner calls, in every period: `propose`, then `adopt` with the plan the governor let
     through, which may differ from the candidate (or be the accepted one). Filters re-read their
     state from the plan at the next hand-over, so that what they believe is what is played.
+
+    Attributes:
+        name: How it is selected.
+        disturbance: Slow estimate of measured minus modelled specific force at the head, (3,)
+            [m/s2]; set from outside, added to the predicted output by algorithms that predict.
     """
 
     name: str
+    disturbance: Array
 
     def propose(
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus
@@ -77,6 +84,10 @@ class Cueing(Protocol):
             plan: The proposed plan; the next period begins on it.
             kappa: Share of the candidate in it, 0..1.
         """
+        ...
+
+    def retune(self, tuning: Tuning) -> None:
+        """Take other tunables; motion stays continuous because plans are."""
         ...
 
     def report(self) -> Report:

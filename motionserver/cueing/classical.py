@@ -57,6 +57,8 @@ class Classical:
 
     def __init__(self, machine: Machine, tuning: Tuning, period: float) -> None:
         self._machine, self._tuning, self._period = machine, tuning, period
+        # part of the interface; a filter does not predict, so nothing is corrected by it
+        self.disturbance: Array = np.zeros(3)
         grid = make_grid(LOOK, period)
         self._times = grid.knots
         self._rotation = RotationPart(REID_NAHON, grid)

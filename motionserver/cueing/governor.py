@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import frozen
-from motionserver.core.plan import Plan
+from motionserver.core.plan import FIRST_STEP, KNOT_STEP, Plan
 from motionserver.core.safety.verdict import Rejection
 from motionserver.cueing.base import Candidate
 
@@ -60,7 +60,7 @@ def govern(
         # the accepted plan must be at rest where the candidate is, or the blend would cut it off
         end = parent.duration - takeover
         if end > times[-1] + 1e-9:
-            times = np.append(times, end)
+            times = np.append(times, max(end, times[-1] + KNOT_STEP))
         pose, velocity, acceleration = parent.evaluate(takeover + times)
         aim = (
             _held(candidate.pose, len(times)),
@@ -87,7 +87,7 @@ def govern(
 
 def remainder(parent: Plan, takeover: float, plan_id: int) -> Plan:
     """The accepted plan from ``takeover`` [s] on, as a plan of its own: the same quintics."""
-    later = parent.times[parent.times > takeover + 1e-4]
+    later = parent.times[parent.times > takeover + FIRST_STEP]
     if len(later) == 0:
         later = np.array([takeover + 0.01])
     instants = np.concatenate(([takeover], later))

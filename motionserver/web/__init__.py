@@ -1,1 +1,1 @@
-"""The page and the HTTP interface."""
+"""The process that shows and tunes: FastAPI beside the motion, never in its way."""

@@ -34,8 +34,12 @@ def leg_vectors(machine: Machine, poses: Array) -> tuple[Array, Array]:
 def leg_lengths(machine: Machine, poses: Array) -> Array:
     """Pin-to-pin leg lengths for poses (N, 6) or one pose (6,): (N, 6) or (6,) [m]."""
     batch = np.atleast_2d(poses)
-    legs, _ = leg_vectors(machine, batch)
-    lengths: Array = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
+    # one plain matrix product for all poses: (N 3, 3) x (3, 6), legs along the last axis
+    turned = rotation(batch[:, 3:]).reshape(-1, 3) @ machine.platform_joints.T
+    legs = turned.reshape(-1, 3, 6)
+    legs += batch[:, :3, None]
+    legs -= _base_from_reference(machine)
+    lengths: Array = np.sqrt(np.einsum("nij,nij->nj", legs, legs))
     return lengths if poses.ndim == 2 else lengths[0]
 
 
@@ -49,17 +53,22 @@ def jacobian(machine: Machine, poses: Array) -> Array:
     Returns:
         J_E with l' = J_E q', (N, 6 legs, 6 axes).
     """
-    out, _ = _jacobian(machine, poses)
+    out = _jacobian(machine, poses)
     out[..., 3:] = np.matmul(out[..., 3:], euler_rate_matrix(poses[:, 3:]))
     return out
 
 
-def _jacobian(machine: Machine, poses: Array) -> tuple[Array, Array]:
-    """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes; and leg lengths."""
+def _jacobian(machine: Machine, poses: Array) -> Array:
+    """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes, (N, 6, 6)."""
     legs, arms = leg_vectors(machine, poses)
-    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
-    unit = legs / lengths[..., None]
-    return np.concatenate((unit, np.cross(arms, unit)), axis=-1), lengths
+    rows = np.empty((len(poses), 6, 6))
+    unit = legs / np.sqrt(np.einsum("nij,nij->ni", legs, legs))[..., None]
+    rows[..., :3] = unit
+    # written out: np.cross costs several times the arithmetic at these sizes
+    rows[..., 3] = arms[..., 1] * unit[..., 2] - arms[..., 2] * unit[..., 1]
+    rows[..., 4] = arms[..., 2] * unit[..., 0] - arms[..., 0] * unit[..., 2]
+    rows[..., 5] = arms[..., 0] * unit[..., 1] - arms[..., 1] * unit[..., 0]
+    return rows
 
 
 def leg_motion(
@@ -120,11 +129,40 @@ def joint_angles(machine: Machine, poses: Array) -> Array:
 
 def conditioning(machine: Machine, poses: Array) -> Array:
     """Smallest singular value of the twist Jacobian, angles scaled by the platform radius, (N,)."""
-    radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
-    rows, _ = _jacobian(machine, poses)
-    rows[..., 3:] /= radius
+    rows = _scaled_jacobian(machine, poses)
     smallest = np.linalg.svd(rows, compute_uv=False)[:, -1]
     return smallest.astype(np.float64, copy=False)
+
+
+def is_conditioned(machine: Machine, poses: Array, least: float) -> bool:
+    """True if `conditioning` is at least ``least`` at all poses (N, 6); cheaper than its values.
+
+    1 / |J^-1| in the Frobenius norm never exceeds the smallest singular value, so the costly
+    decomposition is needed for those poses only whose bound is too small.
+    """
+    rows = _scaled_jacobian(machine, poses)
+    try:
+        inverse = np.linalg.inv(rows)
+    except np.linalg.LinAlgError:
+        return False
+    doubtful = np.einsum("nij,nij->n", inverse, inverse) * least**2 > 1.0
+    if not doubtful.any():
+        return True
+    values = np.linalg.svd(rows[doubtful], compute_uv=False)[:, -1]
+    return bool(values.min() >= least)
+
+
+def _scaled_jacobian(machine: Machine, poses: Array) -> Array:
+    radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
+    rows = _jacobian(machine, poses)
+    rows[..., 3:] /= radius
+    return rows
+
+
+@lru_cache(maxsize=16)
+def _base_from_reference(machine: Machine) -> Array:
+    """Base joints as seen from the reference point at neutral, (3, 6) [m]."""
+    return frozen(machine.base_joints.T - np.array([[0.0], [0.0], [machine.neutral_height]]))
 
 
 @lru_cache(maxsize=16)

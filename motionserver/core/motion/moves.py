@@ -16,6 +16,8 @@ SAMPLES = 65
 SHORTEST = 0.5
 """Shortest move [s]."""
 
+_SHARES = np.linspace(0.0, 1.0, SAMPLES)[:, None]
+
 # largest first, second and third derivative of the quintic 10 t^3 - 15 t^4 + 6 t^5 on [0, 1]
 _RATE, _BEND, _SNAP = 1.875, 5.7735027, 60.0
 
@@ -36,7 +38,12 @@ class StraightWay:
 
 
 def straight_way(machine: Machine, start: Array, goal: Array) -> StraightWay:
-    """Lay the way and bound its duration by the chain rule.
+    """The way from ``start`` to ``goal``, both (6,): see `straight_ways`."""
+    return straight_ways(machine, start, goal[None])[0]
+
+
+def straight_ways(machine: Machine, start: Array, goals: Array) -> list[StraightWay]:
+    """Lay the ways to several goals and bound their durations by the chain rule.
 
     With l(s) the lengths along the way and s(t) the quintic: l' <= L1 s', l'' <= L1 s'' + L2 s'^2,
     l''' <= L1 s''' + 3 L2 s' s'' + L3 s'^3, each term at its largest.
@@ -44,26 +51,29 @@ def straight_way(machine: Machine, start: Array, goal: Array) -> StraightWay:
     Args:
         machine: Geometry and pace.
         start: Pose to leave, (6,).
-        goal: Pose to reach, (6,).
+        goals: Poses to reach, (H, 6).
 
     Returns:
-        The way; whether its legs are allowed is not judged here.
+        One way per goal; whether their legs are allowed is not judged here.
     """
-    share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
-    poses = start + share * (goal - start)
-    legs = leg_lengths(machine, poses)
-    first = np.diff(legs, axis=0) * (SAMPLES - 1)
-    second = np.diff(first, axis=0) * (SAMPLES - 1)
-    third = np.diff(second, axis=0) * (SAMPLES - 1)
-    l1, l2, l3 = (float(np.max(np.abs(d))) for d in (first, second, third))
+    poses = start + _SHARES * (goals - start)[:, None]
+    legs = leg_lengths(machine, poses.reshape(-1, 6)).reshape(poses.shape)
+    slopes = legs
+    largest = []
+    for _ in range(3):
+        slopes = (slopes[:, 1:] - slopes[:, :-1]) * (SAMPLES - 1)
+        largest.append(np.abs(slopes).max((1, 2)))
     pace = machine.pace
-    duration = max(
-        SHORTEST,
-        _RATE * l1 / pace.speed,
-        ((_BEND * l1 + _RATE**2 * l2) / pace.acceleration) ** 0.5,
-        ((_SNAP * l1 + 3 * _RATE * _BEND * l2 + _RATE**3 * l3) / pace.jerk) ** (1 / 3),
-    )
-    return StraightWay(poses, legs, duration)
+    ways = []
+    for way, lengths, l1, l2, l3 in zip(poses, legs, *largest, strict=True):
+        duration = max(
+            SHORTEST,
+            _RATE * l1 / pace.speed,
+            ((_BEND * l1 + _RATE**2 * l2) / pace.acceleration) ** 0.5,
+            ((_SNAP * l1 + 3 * _RATE * _BEND * l2 + _RATE**3 * l3) / pace.jerk) ** (1 / 3),
+        )
+        ways.append(StraightWay(way, lengths, float(duration)))
+    return ways
 
 
 def rest_to_rest(

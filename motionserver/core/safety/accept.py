@@ -6,10 +6,12 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.core.limits import Machine
-from motionserver.core.motion.moves import rest_to_rest, straight_way
+from motionserver.core.motion.moves import rest_to_rest, straight_way, straight_ways
 from motionserver.core.plan import Plan, rest_at
+from motionserver.core.safety.shape import well_formed
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.core.safety.verify import (
+    AHEAD,
     CLOSEST,
     GUARD_MARGINS,
     LONGEST_MOVE,
@@ -17,7 +19,6 @@ from motionserver.core.safety.verify import (
     check_legs,
     check_ways_home,
     judge,
-    well_formed,
 )
 
 
@@ -43,6 +44,10 @@ def accept_proposal(
         if not np.isfinite(plan.takeover):
             return Rejection(Reason.NOT_FINITE)
         return Rejection(Reason.TOO_LATE, None, None, plan.takeover, earliest)
+    if plan.takeover - clock > AHEAD:
+        if not np.isfinite(plan.takeover):
+            return Rejection(Reason.NOT_FINITE)
+        return Rejection(Reason.TOO_EARLY, None, None, plan.takeover, clock + AHEAD)
     rejection = judge(machine, plan, parent.plan, parent.before, GUARD_MARGINS, homes)
     if rejection is not None:
         return rejection
@@ -118,4 +123,4 @@ def accept_move(
 
 
 def _home_bound(machine: Machine, rest: Array, homes: Array) -> float:
-    return max(straight_way(machine, rest, home).duration for home in homes)
+    return max(way.duration for way in straight_ways(machine, rest, homes))

@@ -15,6 +15,7 @@ class Reason(StrEnum):
     NOT_FINITE = "not-finite"
     WRONG_PARENT = "wrong-parent"
     TOO_LATE = "too-late"
+    TOO_EARLY = "too-early"
     NOT_CUEING = "not-cueing"
     NOT_AT_REST = "not-at-rest"
     DISCONTINUOUS = "discontinuous"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,27 +11,29 @@ import numpy as np
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import (
     conditioning,
+    is_conditioned,
     joint_angles,
     leg_lengths,
     neutral_conditioning,
 )
 from motionserver.core.limits import Machine
-from motionserver.core.motion.moves import straight_way
-from motionserver.core.plan import MAX_DURATION, MAX_KNOTS, Plan
+from motionserver.core.motion.moves import straight_ways
+from motionserver.core.plan import MAX_DURATION, Plan
+from motionserver.core.safety.shape import continues, well_formed
 from motionserver.core.safety.verdict import Reason, Rejection
 
 GRID: Final = 0.002
 """Spacing of the samples that are checked [s]."""
 CLOSEST: Final = 0.003
 """Least time between two hand-overs [s]: the samples before a hand-over lie on one parent."""
+AHEAD: Final = 0.5
+"""Longest wait of an accepted plan for its instant [s]: nothing may hold off a stop for longer."""
 LONGEST_MOVE: Final = 60.0
 """Longest rest-to-rest move [s]."""
 
-_POSE_TOLERANCE: Final = 1e-7
-_VELOCITY_TOLERANCE: Final = 1e-6
-_ACCELERATION_TOLERANCE: Final = 1e-4
-_COARSE: Final = 10
-_SPARSE: Final = 100
+_DOUBTFUL: Final = 0.65
+_POSTURE_EVERY: Final = 16
+_WAY_EVERY: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +44,21 @@ class Margins:
         stroke: Kept from both ends of the stroke [m]; a h^2/8 is 4 um of it.
         share: Share of leg speed and acceleration that may be used [-].
         jerk_share: Share of leg jerk that may be used [-]; jerk changes fastest between samples.
+        swing: Kept from the largest joint angle [rad].
+        conditioning: Least conditioning as a multiple of the machine's [-].
     """
 
     stroke: float = 0.0002
     share: float = 0.995
     jerk_share: float = 0.97
+    swing: float = 0.001
+    conditioning: float = 1.01
 
 
 GUARD_MARGINS: Final = Margins()
-PLANNER_MARGINS: Final = Margins(stroke=0.0005, share=0.98, jerk_share=0.94)
+PLANNER_MARGINS: Final = Margins(
+    stroke=0.0005, share=0.98, jerk_share=0.94, swing=0.003, conditioning=1.03
+)
 """Tighter, so that what remains of an accepted plan passes again on a shifted grid."""
 
 
@@ -78,49 +87,10 @@ def judge(
     goals = machine.parked_pose[None] if homes is None else homes
     return (
         well_formed(plan, MAX_DURATION)
-        or _continues(plan, parent)
+        or continues(plan, parent)
         or check_legs(machine, plan, parent, before, margins)
         or check_ways_home(machine, plan.rest_pose, goals, margins)
     )
-
-
-def well_formed(plan: Plan, longest: float) -> Rejection | None:
-    """Shape, order of knots, finiteness, and rest at the end."""
-    count = len(plan.times)
-    shape = (count, 6)
-    tables = (plan.pose, plan.velocity, plan.acceleration)
-    if not 2 <= count <= MAX_KNOTS:
-        return Rejection(Reason.MALFORMED, value=count, allowed=MAX_KNOTS)
-    if plan.times.shape != (count,) or any(table.shape != shape for table in tables):
-        return Rejection(Reason.MALFORMED)
-    if not (
-        np.isfinite(plan.takeover) and all(np.isfinite(t).all() for t in (plan.times, *tables))
-    ):
-        return Rejection(Reason.NOT_FINITE)
-    if plan.times[0] != 0.0 or np.min(np.diff(plan.times)) < 1e-4:
-        return Rejection(Reason.MALFORMED, when=float(plan.times[0]))
-    if plan.duration > longest:
-        return Rejection(Reason.MALFORMED, value=plan.duration, allowed=longest)
-    # wild numbers could overflow in the kinematics; no platform of ours is a hundred metres wide
-    if max(float(np.max(np.abs(t))) for t in tables) > 1e4:
-        return Rejection(Reason.NOT_FINITE, value=1e4)
-    speed = float(max(np.max(np.abs(plan.velocity[-1])), np.max(np.abs(plan.acceleration[-1]))))
-    if speed > 1e-9:
-        return Rejection(Reason.NOT_AT_REST, when=plan.duration, value=speed, allowed=0.0)
-    return None
-
-
-def _continues(plan: Plan, parent: Plan) -> Rejection | None:
-    there = parent.state(plan.takeover)
-    for found, wanted, tolerance in (
-        (plan.pose[0], there.pose, _POSE_TOLERANCE),
-        (plan.velocity[0], there.velocity, _VELOCITY_TOLERANCE),
-        (plan.acceleration[0], there.acceleration, _ACCELERATION_TOLERANCE),
-    ):
-        gap = float(np.max(np.abs(found - wanted)))
-        if gap > tolerance:
-            return Rejection(Reason.DISCONTINUOUS, when=0.0, value=gap, allowed=tolerance)
-    return None
 
 
 def check_legs(
@@ -129,20 +99,18 @@ def check_legs(
     """Leg length, speed, acceleration, jerk on the grid; joints and the rest coarser."""
     # a long move is smooth: two thousand samples show it whole
     step = max(GRID, plan.duration / 2000.0)
-    times: Array = np.arange(int(np.ceil(plan.duration / step)) + 4, dtype=np.float64) * step
-    lead = _played_before(plan, parent, before, step)
-    poses = np.concatenate((lead, plan.poses(times)))
-    skipped = len(lead)
+    poses, skipped = _samples(plan, parent, before, step)
     legs = leg_lengths(machine, poses)
 
-    def at(row: int, behind: int) -> float:
-        return max(0.0, (row + behind - skipped) * step)
+    def at(row: int) -> float:
+        return max(0.0, (row - skipped) * step)
 
     low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
-    for value, allowed, outside in ((legs.min(), low, legs < low), (legs.max(), high, legs > high)):
+    for allowed, outside in ((low, legs < low), (high, legs > high)):
         if outside.any():
-            row, leg = np.argwhere(outside)[0]
-            return Rejection(Reason.LEG_LENGTH, at(row, 0), int(leg), float(value), allowed)
+            first, short = (int(index) for index in np.argwhere(outside)[0])
+            found = float(legs[first, short])
+            return Rejection(Reason.LEG_LENGTH, at(first), short, found, allowed)
     moved = legs
     for order, reason, limit, share in (
         (1, Reason.LEG_SPEED, machine.leg_speed, margins.share),
@@ -152,39 +120,61 @@ def check_legs(
         moved = np.diff(moved, axis=0) / step
         if limit is None:
             continue
-        size = np.abs(moved)
+        size, spacing = np.abs(moved), step
+        if order == 3 and limit * _DOUBTFUL < size.max() <= limit * share:
+            # jerk changes between samples: seen from other instants it can be a third larger
+            size, spacing = _fine_jerk(machine, plan, parent, before, step / 2.0), step / 2.0
         largest = float(size.max())
         if largest > limit * share:
             row, leg = np.unravel_index(int(size.argmax()), size.shape)
-            return Rejection(reason, at(int(row), order), int(leg), largest, limit * share)
-    return _check_coarse(machine, poses, step, skipped)
-
-
-def _check_coarse(machine: Machine, poses: Array, step: float, skipped: int) -> Rejection | None:
-    if machine.joint_angle is not None:
-        swing = joint_angles(machine, poses[::_COARSE])
-        if swing.max() > machine.joint_angle:
-            row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
-            when = max(0.0, (int(row) * _COARSE - skipped) * step)
-            return Rejection(
-                Reason.JOINT_ANGLE, when, int(leg), float(swing.max()), machine.joint_angle
-            )
-    if machine.conditioning is not None:
-        sparse = np.concatenate((poses[::_SPARSE], poses[-1:]))
-        least = machine.conditioning * neutral_conditioning(machine)
-        values = conditioning(machine, sparse)
-        if values.min() < least:
-            when = max(0.0, (int(values.argmin()) * _SPARSE - skipped) * step)
-            return Rejection(Reason.CONDITIONING, when, None, float(values.min()), least)
+            when = max(0.0, (int(row) + order - skipped) * spacing)
+            return Rejection(reason, when, int(leg), largest, limit * share)
     if machine.passenger_acceleration is not None:
         second = np.diff(poses[:, :3], 2, axis=0) / step**2
         size = np.linalg.norm(second, axis=1)
-        if size.max() > machine.passenger_acceleration:
-            when = max(0.0, (int(size.argmax()) + 2 - skipped) * step)
-            return Rejection(
-                Reason.PASSENGER, when, None, float(size.max()), machine.passenger_acceleration
-            )
+        largest, allowed = float(size.max()), machine.passenger_acceleration * margins.share
+        if largest > allowed:
+            return Rejection(Reason.PASSENGER, at(int(size.argmax()) + 2), None, largest, allowed)
+    return _check_posture(machine, poses, margins, _POSTURE_EVERY, at)
+
+
+def _check_posture(
+    machine: Machine,
+    poses: Array,
+    margins: Margins,
+    every: int,
+    at: Callable[[int], float | None],
+) -> Rejection | None:
+    """Joint angles and conditioning at some of the poses (N, 6), the last one included."""
+    rows = np.append(np.arange(0, len(poses), every), len(poses) - 1)
+    if machine.joint_angle is not None:
+        swing = joint_angles(machine, poses[rows])
+        largest, allowed = float(swing.max()), machine.joint_angle - margins.swing
+        if largest > allowed:
+            row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
+            when = at(int(rows[row]))
+            return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
+    if machine.conditioning is not None:
+        allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
+        if not is_conditioned(machine, poses[rows], allowed):
+            found = conditioning(machine, poses[rows])
+            when = at(int(rows[found.argmin()]))
+            return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None
+
+
+def _fine_jerk(
+    machine: Machine, plan: Plan, parent: Plan, before: Plan | None, step: float
+) -> Array:
+    poses, _ = _samples(plan, parent, before, step)
+    return np.abs(np.diff(leg_lengths(machine, poses), 3, axis=0)) / step**3
+
+
+def _samples(plan: Plan, parent: Plan, before: Plan | None, step: float) -> tuple[Array, int]:
+    """Poses on the grid, to three samples after the end; and how many of them lie before it."""
+    times: Array = np.arange(int(np.ceil(plan.duration / step)) + 4, dtype=np.float64) * step
+    lead = _played_before(plan, parent, before, step)
+    return np.concatenate((lead, plan.poses(times))), len(lead)
 
 
 def _played_before(plan: Plan, parent: Plan, before: Plan | None, step: float) -> Array:
@@ -201,14 +191,16 @@ def check_ways_home(
     machine: Machine, rest: Array, homes: Array, margins: Margins
 ) -> Rejection | None:
     """From the rest pose (6,) a straight, allowed way to each of the poses ``homes`` (H, 6)."""
-    for home in homes:
-        way = straight_way(machine, rest, home)
-        short, long = float(way.legs.min()), float(way.legs.max())
-        if short < machine.leg_min + margins.stroke or long > machine.leg_max - margins.stroke:
-            beyond = max(machine.leg_min + margins.stroke - short, long - machine.leg_max)
+    ways = straight_ways(machine, rest, homes)
+    low, high = machine.leg_min + margins.stroke, machine.leg_max - margins.stroke
+    for way in ways:
+        beyond = max(low - float(way.legs.min()), float(way.legs.max()) - high)
+        if beyond > 0.0:
             return Rejection(Reason.NO_WAY_HOME, None, None, beyond, 0.0)
-        if _check_coarse(machine, way.poses[::4], GRID, 0) is not None:
-            return Rejection(Reason.NO_WAY_HOME)
         if way.duration > LONGEST_MOVE:
             return Rejection(Reason.NO_WAY_HOME, None, None, way.duration, LONGEST_MOVE)
+    poses = np.concatenate([way.poses for way in ways])
+    posture = _check_posture(machine, poses, margins, _WAY_EVERY, lambda row: None)
+    if posture is not None:
+        return Rejection(Reason.NO_WAY_HOME, None, posture.leg, posture.value, posture.allowed)
     return None

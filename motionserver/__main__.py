@@ -1,0 +1,5 @@
+"""``python -m motionserver``."""
+
+from motionserver.cli import main
+
+main()

@@ -1,0 +1,226 @@
+"""All commands; what they need is imported when they run, so that help is quick."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from motionserver import __version__
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Motion-cueing server: a driving simulator in, a hexapod out, verified before it moves.",
+)
+ConfigFile = Annotated[Path, typer.Argument(help="configuration, TOML", metavar="CONFIG.toml")]
+MaybeConfig = Annotated[
+    Path | None, typer.Argument(help="configuration of the running server", metavar="CONFIG.toml")
+]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"motionserver {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    """Software here is operational protection, not a safety function: E-stop is hardware."""
+
+
+@app.command()
+def run(
+    config: ConfigFile,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="play everything, send nothing that moves")
+    ] = False,
+) -> None:
+    """Run the server: guard, planner and page; parks on Ctrl-C or SIGTERM."""
+    from motionserver.cli.serving import serve
+
+    raise typer.Exit(serve(config, dry_run))
+
+
+@app.command()
+def check(config: ConfigFile) -> None:
+    """Validate a configuration and show what it means."""
+    from motionserver.cli.serving import describe
+
+    typer.echo(describe(config))
+
+
+@app.command()
+def engage(config: MaybeConfig = None) -> None:
+    """Raise the platform: an operator's edge, given at the console."""
+    _ask("engage", config)
+
+
+@app.command()
+def park(config: MaybeConfig = None) -> None:
+    """Park the platform, from whatever it does."""
+    _ask("park", config)
+
+
+@app.command()
+def reset(config: MaybeConfig = None) -> None:
+    """Leave FAULT or SAFE once the cause is gone."""
+    _ask("reset", config)
+
+
+@app.command()
+def status(
+    config: MaybeConfig = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print everything as JSON")] = False,
+) -> None:
+    """Show what a running server does."""
+    from motionserver.cli.serving import status_text
+
+    typer.echo(status_text(config, as_json))
+
+
+def _ask(op: str, config: Path | None) -> None:
+    from motionserver.cli.serving import ask_guard
+
+    answer = ask_guard(op, config)
+    granted = "ok" if answer["ok"] else "refused"
+    typer.echo(f"{op}: {granted}, state {answer['state']}: {answer['reason']}")
+    raise typer.Exit(0 if answer["ok"] else 1)
+
+
+@app.command()
+def demo(
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
+    ] = None,
+    no_page: Annotated[bool, typer.Option("--no-page", help="without the page")] = False,
+    algorithm: Annotated[
+        str, typer.Option("--algorithm", help="classical or thondel2014", metavar="NAME")
+    ] = "thondel2014",
+    fault: Annotated[
+        str,
+        typer.Option(
+            "--fault", help="cue-loss, planner-kill, web-kill, platform-loss or nan", metavar="F"
+        ),
+    ] = "",
+    recording: Annotated[
+        str, typer.Option("--recording", help="a shipped recording", metavar="NAME")
+    ] = "truck_brake_accel",
+    json_out: Annotated[
+        Path | None, typer.Option("--json", help="write the summary here", metavar="OUT")
+    ] = None,
+) -> None:
+    """A truck's drive moves a simulated Moog base: no configuration, no root, no hardware."""
+    from motionserver.cli.demo import Demo
+
+    raise typer.Exit(Demo(seconds, not no_page, algorithm, fault, recording, json_out).run())
+
+
+@app.command()
+def emulate(
+    form: Annotated[str, typer.Argument(help="moog-6dof2000e", metavar="FORMAT")],
+    listen: Annotated[str, typer.Option("--listen", help="address", metavar="HOST:PORT")],
+    force_to: Annotated[
+        str, typer.Option("--force-to", help="send measured force as cues", metavar="HOST:PORT")
+    ] = "",
+    summary: Annotated[
+        Path | None, typer.Option("--summary", help="write the verdict here", metavar="OUT")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option("--log", help="write every datagram here", metavar="OUT")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="of everything random")] = 0,
+    cut_after: Annotated[
+        float | None, typer.Option("--cut-after", help="pull the cable then", metavar="S")
+    ] = None,
+) -> None:
+    """Be a platform: state machine, rate-limited legs, latched faults, and a judge."""
+    from motionserver.cli.devices import emulate as emulate_device
+
+    verdict = emulate_device(form, listen, force_to, summary, log, seconds, seed, cut_after)
+    typer.echo(json.dumps(verdict, indent=2))
+
+
+@app.command()
+def replay(
+    recording: Annotated[str, typer.Argument(help="CSV file or shipped name", metavar="INPUT.csv")],
+    to: Annotated[str, typer.Option("--to", help="the server's input", metavar="HOST:PORT")],
+    form: Annotated[str, typer.Option("--format", help="native or beamng")] = "native",
+    loop: Annotated[bool, typer.Option("--loop", help="begin again at the end")] = False,
+    preview: Annotated[
+        float, typer.Option("--preview", help="seconds of future to send along", metavar="S")
+    ] = 0.0,
+) -> None:
+    """Send a recording as a simulator would, in real time."""
+    from motionserver.cli.devices import replay as replay_recording
+
+    typer.echo(replay_recording(recording, to, form, loop, preview))
+
+
+@app.command()
+def evaluate(
+    recording: Annotated[Path, typer.Argument(help="recording", metavar="INPUT.csv")],
+    algorithm: Annotated[
+        str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
+    ] = "classical,thondel2014",
+    platform: Annotated[
+        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
+    ] = "t2-compact",
+    scale: Annotated[float, typer.Option("--scale", help="share wanted", metavar="K")] = 0.6,
+    rate: Annotated[float, typer.Option("--rate", help="of setpoints", metavar="HZ")] = 500.0,
+    setpoints: Annotated[
+        Path | None, typer.Option("--setpoints", help="write executed samples", metavar="OUT.csv")
+    ] = None,
+    json_out: Annotated[
+        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
+    ] = None,
+    html_out: Annotated[
+        Path | None, typer.Option("--html", help="write a report", metavar="OUT")
+    ] = None,
+) -> None:
+    """Judge algorithms on a recording, offline, with the live code."""
+    from motionserver.cli.offline import run_evaluate
+
+    raise typer.Exit(
+        run_evaluate(recording, algorithm, platform, scale, rate, setpoints, json_out, html_out)
+    )
+
+
+@app.command()
+def reproduce(
+    paper: Annotated[str, typer.Argument(help="thondel2014")],
+    out: Annotated[
+        Path, typer.Option("--out", help="folder of figures and numbers", metavar="DIR")
+    ] = Path("out/thondel2014"),
+) -> None:
+    """Redraw a paper's figures; exits non-zero when its claims no longer hold."""
+    from motionserver.cli.offline import run_reproduce
+
+    raise typer.Exit(run_reproduce(paper, out))
+
+
+@app.command()
+def bench(
+    what: Annotated[str, typer.Argument(help="loop, plan, latency or all")] = "all",
+    seconds: Annotated[
+        float, typer.Option("--seconds", help="length of each part", metavar="S")
+    ] = 20.0,
+    json_out: Annotated[
+        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
+    ] = None,
+) -> None:
+    """Measure lateness, plan times and latency beside a sentinel that only sleeps."""
+    from motionserver.cli.offline import run_bench
+
+    raise typer.Exit(run_bench(what, seconds, json_out))

@@ -1,0 +1,81 @@
+"""emulate and replay: the other ends of the wire."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from pathlib import Path
+
+from motion_clients.flawed_link import LinkFlaws
+from motion_clients.moog_emulator import run_emulator
+from motion_clients.recording import RecordingError, recording_names, recording_path
+from motion_clients.replay import FORMATS
+from motion_clients.replay import replay as send_recording
+
+from motionserver.errors import ConfigError
+from motionserver.settings.config import split_address
+from motionserver.telemetry.realtime import take_priority
+
+PUNCTUAL = 20
+"""Real-time priority to ask for: a base and a simulator are punctual, an emulated one must be."""
+EMULATORS = ("moog-6dof2000e",)
+
+
+def _address(option: str, text: str) -> tuple[str, int]:
+    try:
+        return split_address(text)
+    except ValueError as error:
+        raise ConfigError(option, str(error), "Give HOST:PORT.") from error
+
+
+def emulate(
+    form: str,
+    listen: str,
+    force_to: str,
+    summary: Path | None,
+    log: Path | None,
+    seconds: float | None,
+    seed: int,
+    cut_after: float | None,
+) -> dict[str, object]:
+    """Be a device until a signal, as punctual as permitted; returns the judge's verdict."""
+    if form not in EMULATORS:
+        raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
+    host, port = _address("--listen", listen)
+    take_priority(PUNCTUAL, wanted=True)
+    cut = LinkFlaws()
+    if cut_after is not None:
+        begin = time.monotonic() + cut_after
+        cut = LinkFlaws(silent_from=begin, silent_until=float("inf"))
+    try:
+        return run_emulator(
+            host,
+            port,
+            duration=seconds,
+            log_path=log,
+            summary_path=summary,
+            force_to=_address("--force-to", force_to) if force_to else None,
+            seed=seed,
+            to_base=cut,
+            to_host=cut,
+        )
+    except OSError as error:
+        raise ConfigError("--listen", f"{listen}: {error.strerror}", "Choose another.") from error
+
+
+def replay(recording: str, to: str, form: str, loop: bool, preview: float) -> str:
+    """Send a recording until its end or a signal; returns what was sent, in words."""
+    if form not in FORMATS:
+        raise ConfigError("--format", f"unknown {form!r}", f"Allowed: {', '.join(FORMATS)}.")
+    path = recording_path(recording) if recording in recording_names() else Path(recording)
+    host, port = _address("--to", to)
+    take_priority(PUNCTUAL, wanted=True)
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    try:
+        counts = send_recording(path, host, port, fmt=form, stop=stop, loop=loop, preview=preview)
+    except RecordingError as error:
+        raise ConfigError("INPUT.csv", str(error), "Correct the file.") from error
+    return f"sent {counts.sent} packets in {counts.rounds} rounds, {counts.unsent} not sent"

@@ -1,0 +1,139 @@
+"""run, check, engage, park, reset, status."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from motionserver.core.kinematics.hexapod import leg_lengths
+from motionserver.core.limits import machine_from_mapping
+from motionserver.errors import MotionServerError
+from motionserver.settings.config import Config, load_config, run_dir_of
+from motionserver.settings.machine import describe_pose
+from motionserver.settings.resolve import resolve
+from motionserver.supervisor.service import Service
+from motionserver.telemetry.link import Maps
+from motionserver.telemetry.requests import RequestError, ask
+from motionserver.telemetry.ticker import now_ns
+
+SILENT_NS = 2_000_000_000
+"""Age of the guard's last word beyond which nobody runs [ns]."""
+
+
+class NotRunningError(MotionServerError):
+    """No server answers with this configuration."""
+
+
+def serve(path: Path, dry_run: bool) -> int:
+    """Run a server until a signal; returns its exit status."""
+    config = load_config(path)
+    logging.basicConfig(
+        level=config.server.log_level.upper(), format="%(asctime)s %(name)s %(message)s"
+    )
+    log = logging.getLogger("motionserver.supervisor")
+    run_dir = run_dir_of(config)
+    service = make_service(config, run_dir, dry_run)
+    if config.web.enabled:
+        scheme = "https" if config.web.tls_cert else "http"
+        log.info("page %s://%s:%d", scheme, config.web.host, config.web.port)
+    if dry_run:
+        log.info("dry run: everything is played, nothing that moves is sent")
+    if config.operator.engage == "auto":
+        log.warning("engage = auto: the platform RISES BY ITSELF when the first source is fresh")
+    return asyncio.run(service.run())
+
+
+def make_service(config: Config, run_dir: Path, dry_run: bool) -> Service:
+    """The service of a configuration."""
+    resolved = resolve(config, run_dir, dry_run)
+    local = (config.platform.local_host, config.platform.local_port)
+    return Service(resolved, config.web.enabled, local, run_dir)
+
+
+def describe(path: Path) -> str:
+    """What a configuration means, for people."""
+    config = load_config(path)
+    resolved = resolve(config, run_dir_of(config))
+    machine = machine_from_mapping(resolved["machine"])
+    platform, planner = resolved["platform"], resolved["planner"]
+    stroke = (machine.leg_max - machine.leg_min) * 1e3
+    neutral = leg_lengths(machine, np.zeros(6))
+    lines = [
+        f"{path}: valid",
+        f"platform   {platform['format']} ({config.platform.mode}) at {platform['host']}:"
+        f"{platform['port']}, {platform['rate_hz']:g} packets/s",
+        f"machine    {machine.name}, limits {machine.digest}: stroke {stroke:.1f} mm, "
+        f"leg {machine.leg_speed:g} m/s, {machine.leg_acceleration:g} m/s2, "
+        + ("jerk unchecked" if machine.leg_jerk is None else f"{machine.leg_jerk:g} m/s3"),
+        f"neutral    legs {neutral.min():.4f} to {neutral.max():.4f} m; parked at "
+        + describe_pose(machine.parked_pose),
+        f"unchecked  {', '.join(resolved['unchecked']) or 'nothing'}",
+        f"planner    {planner['tuning']['algorithm']}, scale {planner['tuning']['scale']:g}, "
+        f"{1 / planner['period']:.1f} Hz, {planner['budget'] * 1e3:.1f} ms before the packet",
+    ]
+    lines += [f"source     {s['kind']} on {s['host']}:{s['port']}" for s in resolved["sources"]]
+    lines.append(f"engage     {config.operator.engage}")
+    if config.web.enabled:
+        lines.append(f"page       {config.web.host}:{config.web.port}")
+    if config.platform.mode == "dof":
+        lines.append("note       the base takes a pose: leg limits hold for the declared geometry")
+    return "\n".join(lines)
+
+
+def ask_guard(op: str, path: Path | None) -> dict[str, Any]:
+    """Send an operator's edge over the guard's own socket."""
+    run_dir = run_dir_of(load_config(path))
+    try:
+        return ask(run_dir / "guard.sock", {"op": op, "by": "console"}, timeout=2.0)
+    except RequestError as error:
+        raise NotRunningError(f"{op}: {error}") from error
+
+
+def status_text(path: Path | None, as_json: bool) -> str:
+    """What a running server does, for people or as JSON."""
+    run_dir = run_dir_of(load_config(path))
+    try:
+        maps = Maps(run_dir)
+    except (OSError, ValueError) as error:
+        raise NotRunningError(f"status: no server runs in {run_dir} ({error})") from error
+    parts = {}
+    for name, source in (
+        ("guard", maps.guard),
+        ("planner", maps.planner),
+        ("processes", maps.service),
+    ):
+        message = source.read()
+        parts[name] = None if message is None else json.loads(message[1])
+    guard, planner = parts["guard"], parts["planner"]
+    if guard is not None and (age := now_ns() - guard["t_ns"]) > SILENT_NS:
+        raise NotRunningError(
+            f"status: no server runs in {run_dir}; its last word is {age * 1e-9:.0f} s old: "
+            f"{guard['state']}, {guard['reason']}"
+        )
+    if as_json:
+        return json.dumps(parts, indent=2)
+    if guard is None:
+        return "the guard has not shown anything yet"
+    lines = [
+        f"state      {guard['state']}: {guard['reason']}",
+        f"pose       {describe_pose(np.array(guard['pose']))}",
+        f"device     {guard['feedback']['device_state']}, faults: "
+        + (", ".join(guard["feedback"]["faults"]) or "none"),
+        f"packets    {guard['rates_hz']['send']:.2f} Hz, ticks late p99 "
+        f"{guard['tick']['late_p99_ms']:.2f} ms",
+    ]
+    if planner is not None:
+        source = planner["source"]
+        lines.append(
+            f"source     {source['kind']} {source['address']}, {source['rate_hz']:.0f} Hz, "
+            f"{'fresh' if source['fresh'] else 'stale'}"
+        )
+        lines.append(
+            f"plans      {planner['algorithm']}, p99 {planner['solver']['time_p99_ms']:.2f} ms"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""From packets to a stimulus: who may speak, what is believed, how it fades."""

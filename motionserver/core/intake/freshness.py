@@ -1,0 +1,69 @@
+"""Is the source alive? Judged by arrival in our own clock, never by whether values change."""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from typing import Final
+
+MS: Final = 1_000_000
+SECOND_NS: Final = 1_000_000_000
+
+
+class Freshness:
+    """Arrival statistics of one source.
+
+    Stale = newest packet older than max(50 ms, 3 T), with T the median interval over the last
+    second, clipped to 5..100 ms.
+    """
+
+    def __init__(self) -> None:
+        self._arrivals: deque[int] = deque(maxlen=1024)
+        self._fresh_since: int | None = None
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Arrival of the newest packet [ns]; None before the first."""
+        return self._arrivals[-1] if self._arrivals else None
+
+    def arrived(self, now_ns: int) -> None:
+        """Note a packet that was believed."""
+        if self.is_stale(now_ns):
+            self._fresh_since = now_ns
+        self._arrivals.append(now_ns)
+        while now_ns - self._arrivals[0] > SECOND_NS:
+            self._arrivals.popleft()
+
+    def interval_ns(self) -> int:
+        """Median interval T of the last second, clipped to 5..100 ms [ns]."""
+        if len(self._arrivals) < 3:
+            return 100 * MS
+        times = list(self._arrivals)
+        gaps = sorted(b - a for a, b in itertools.pairwise(times))
+        return min(max(gaps[len(gaps) // 2], 5 * MS), 100 * MS)
+
+    def stale_after_ns(self) -> int:
+        """Age beyond which the source is stale [ns]."""
+        return max(50 * MS, 3 * self.interval_ns())
+
+    def age_ns(self, now_ns: int) -> int | None:
+        """Age of the newest packet [ns]; None before the first."""
+        return None if not self._arrivals else now_ns - self._arrivals[-1]
+
+    def is_stale(self, now_ns: int) -> bool:
+        """True if nothing came for too long, or ever."""
+        age = self.age_ns(now_ns)
+        return age is None or age > self.stale_after_ns()
+
+    def fresh_for_ns(self, now_ns: int) -> int:
+        """How long it has been fresh without a break [ns]; 0 when stale."""
+        if self.is_stale(now_ns) or self._fresh_since is None:
+            return 0
+        return now_ns - self._fresh_since
+
+    def rate_hz(self) -> float:
+        """Packets believed per second [Hz]."""
+        times = self._arrivals
+        if len(times) < 2 or times[-1] == times[0]:
+            return 0.0
+        return (len(times) - 1) * SECOND_NS / (times[-1] - times[0])

@@ -1,0 +1,140 @@
+"""What is believed of one packet: its owner, order, age and range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.axes import GRAVITY, Array
+from motionserver.core.intake.freshness import SECOND_NS, Freshness
+from motionserver.core.state import DriveMode, VehicleMotion
+
+REORDER_NS: Final = 2 * SECOND_NS
+"""Silence after which an owner may be replaced [ns]."""
+IMPLAUSIBLE_FORCE: Final = 10.0 * GRAVITY
+"""Specific force no road vehicle survives: the packet is not believed [m/s2]."""
+IMPLAUSIBLE_RATE: Final = np.radians(4000.0)
+"""Body rate beyond every vehicle: the packet is not believed [rad/s]."""
+FASTEST: Final = 1000.0
+"""Speed beyond every vehicle: the packet is not believed [m/s]."""
+FARTHEST: Final = 60.0
+"""A preview beyond this is not believed [s]."""
+_LEAK: Final = 100e-6
+"""Upward drift of the least delay, so that a slow sender clock is followed [s/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """Who moves the platform: where the packets come from and which run of it."""
+
+    source: str
+    address: str
+    session: int
+
+
+class Gate:
+    """Believe or refuse packets of one input, one owner at a time."""
+
+    def __init__(self, may_change_owner: Callable[[], bool] = lambda: True) -> None:
+        self.freshness = Freshness()
+        self.owner: Owner | None = None
+        self.mode = DriveMode.DRIVE
+        self.lost = 0
+        self._may_change_owner = may_change_owner
+        self._sequence: int | None = None
+        self._least_offset: float | None = None
+        self._offset_at_ns = 0
+
+    def refuse(self, source: str, address: str, motion: VehicleMotion) -> str | None:
+        """Judge a packet.
+
+        Args:
+            source: Name of the input it came by.
+            address: Sender's address as text.
+            motion: What it says.
+
+        Returns:
+            None if it is believed (and noted), else the name of the counter of the refusal:
+            "second-client", "replayed", "reordered", "old", "out-of-range".
+        """
+        who = Owner(source, address, motion.session)
+        now = motion.arrival_ns
+        silent = self._is_silent(now)
+        if who != self.owner:
+            if not self._may_own(now):
+                return "second-client"
+        elif (order := self._order(motion)) is not None:
+            return order
+        if not _is_plausible(motion):
+            return "out-of-range"
+        if who != self.owner:
+            self._hand_over(who)
+        elif silent:
+            # a longer way or a sender's clock that stood still: the delay is learnt anew
+            self._least_offset = None
+        elif self._is_old(motion):
+            return "old"
+        if motion.sequence is not None and self._sequence is not None:
+            self.lost += max(0, ((motion.sequence - self._sequence) & 0xFFFFFFFF) - 1)
+        self._sequence = motion.sequence
+        self.mode = motion.mode
+        self.freshness.arrived(now)
+        return None
+
+    def _may_own(self, now_ns: int) -> bool:
+        if self.owner is None:
+            return True
+        left = self.mode is DriveMode.BYE or self._is_silent(now_ns)
+        return left and self._may_change_owner()
+
+    def _is_silent(self, now_ns: int) -> bool:
+        age = self.freshness.age_ns(now_ns)
+        return age is None or age > REORDER_NS
+
+    def _order(self, motion: VehicleMotion) -> str | None:
+        if motion.sequence is None or self._sequence is None:
+            return None
+        ahead = (motion.sequence - self._sequence) & 0xFFFFFFFF
+        if ahead == 0:
+            return "replayed"
+        return "reordered" if ahead >= 1 << 31 else None
+
+    def _hand_over(self, who: Owner) -> None:
+        self.owner = who
+        self.freshness = Freshness()
+        self._sequence = None
+        self._least_offset = None
+
+    def _is_old(self, motion: VehicleMotion) -> bool:
+        """Delayed beyond the stale limit against the least delay seen: a burst after a stall."""
+        if motion.sender_ns is None:
+            return False
+        offset = float(motion.arrival_ns - motion.sender_ns)
+        if self._least_offset is None:
+            self._least_offset = offset
+        drift = (motion.arrival_ns - self._offset_at_ns) * _LEAK if self._offset_at_ns else 0.0
+        self._offset_at_ns = motion.arrival_ns
+        self._least_offset = min(self._least_offset + drift, offset)
+        return offset - self._least_offset > self.freshness.stale_after_ns()
+
+
+def _is_plausible(motion: VehicleMotion) -> bool:
+    """False for what no vehicle does, for what is no number, for a future that is none."""
+    if not (_is_within(motion.force, motion.rates) and abs(motion.speed) <= FASTEST):
+        return False
+    preview = motion.preview
+    if preview is None:
+        return True
+    times = preview.times
+    ahead = bool(times[0] >= 0.0 and times[-1] <= FARTHEST and np.all(np.diff(times) > 0.0))
+    return ahead and _is_within(preview.force, preview.rates)
+
+
+def _is_within(force: Array, rates: Array) -> bool:
+    # asked so that a NaN is outside
+    return bool(
+        np.all(np.abs(force) <= IMPLAUSIBLE_FORCE) and np.all(np.abs(rates) <= IMPLAUSIBLE_RATE)
+    )

@@ -1,0 +1,251 @@
+"""Act: one tick of the guard as a function of what came in, from events to a setpoint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.device import Order
+from motionserver.core.kinematics.forward import NoPoseError, forward
+from motionserver.core.kinematics.hexapod import leg_lengths, leg_motion
+from motionserver.core.motion.player import MOST_PENDING, Playback, advance, follow, state_now
+from motionserver.core.plan import Plan
+from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
+from motionserver.core.safety.given import GuardConfig, TickInput
+from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.setpoint import Setpoint
+from motionserver.core.safety.states import CUED, RAISED, Event, State
+from motionserver.core.safety.supervisor import Supervisor, is_standing
+from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
+from motionserver.core.safety.watchdog import SECOND
+from motionserver.core.state import PlatformState
+
+NEUTRAL = frozen(np.zeros(6))
+REACH = 0.005
+"""How far the first setpoint after a restart may differ from the measured legs [m]."""
+
+
+class Guard:
+    """The guard without clock and socket."""
+
+    def __init__(self, config: GuardConfig) -> None:
+        self.config = config
+        self.machine = config.machine
+        self.homes = frozen(np.stack((NEUTRAL, config.machine.parked_pose)))
+        self.record = GuardRecord()
+        self.supervisor = Supervisor(
+            config.machine,
+            config.patience,
+            config.send_period,
+            config.plan_period,
+            config.dry_run,
+        )
+        self._last = Setpoint(
+            Order.WAIT, PlatformState.at_rest(NEUTRAL), leg_lengths(self.machine, NEUTRAL)
+        )
+
+    def tick(self, given: TickInput) -> tuple[Setpoint | None, tuple[str, ...]]:
+        """Act on one tick.
+
+        Args:
+            given: What came in.
+
+        Returns:
+            The setpoint to send now, if one is due; one answer per request, empty = granted.
+        """
+        record, supervisor = self.record, self.supervisor
+        record.leaving = record.leaving or given.leave
+        for feedback in given.feedback:
+            supervisor.device.answered(feedback)
+        supervisor.source.update(given.now_ns, given.cue)
+        if given.proposal is not None:
+            self._judge(given.proposal, given.now_ns)
+        answers, wishes = self._edges(given)
+        followed = supervisor.step(record, given.now_ns, given.gap, wishes)
+        if followed is not None:
+            self._enter(*followed, given.now_ns)
+        if not given.is_due:
+            return None, answers
+        return self._send(given.now_ns), answers
+
+    def _edges(self, given: TickInput) -> tuple[tuple[str, ...], frozenset[Event]]:
+        record, now = self.record, given.now_ns
+        wishes: set[Event] = set()
+        answers: list[str] = []
+        for request in given.requests:
+            record.counters[f"request_{request.op}"] += 1
+            refusal = ""
+            if request.op == "park":
+                wishes.add(Event.PARK)
+            elif request.op == "reset":
+                refusal = self._reset(now)
+            elif request.op != "engage":
+                refusal = f"unknown request {request.op!r}; allowed: engage, park, reset"
+            elif request.by not in ("console", self.config.engage):
+                refusal = (
+                    f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
+                )
+            elif request.by == "http" and not request.enabled:
+                refusal = "the enable input is open: somebody at the platform must hold it"
+            else:
+                refusal = self.supervisor.refusal(record, now)
+                if not refusal:
+                    wishes.add(Event.ENGAGE)
+            if refusal:
+                record.counters["request_refused"] += 1
+            answers.append(refusal)
+        if (
+            self.config.engage == "auto"
+            and not record.engaged_once
+            and not self.supervisor.refusal(record, now)
+        ):
+            record.engaged_once = True
+            wishes.add(Event.ENGAGE)
+        return tuple(answers), frozenset(wishes)
+
+    def _reset(self, now_ns: int) -> str:
+        record = self.record
+        if record.state not in (State.FAULT, State.SAFE):
+            return f"the state is {record.state}; there is nothing to reset"
+        if not is_standing(record.playback):
+            return "the platform still moves; reset when it stands"
+        record.reset_until_ns = now_ns + int(self.config.patience.reset * SECOND)
+        self.supervisor.inconsistent = ""
+        self.supervisor.astray = False
+        return ""
+
+    def _judge(self, proposal: Plan, now_ns: int) -> None:
+        record, playback = self.record, self.record.playback
+        verdict: AcceptedPlan | Rejection
+        if record.state not in CUED or playback is None:
+            verdict = Rejection(Reason.NOT_CUEING)
+        elif len(playback.pending) >= MOST_PENDING:
+            verdict = Rejection(Reason.TOO_EARLY)
+        else:
+            verdict = accept_proposal(
+                self.machine, proposal, playback.newest, playback.newest_clock, self.homes
+            )
+        if isinstance(verdict, Rejection):
+            record.counters["plans_rejected"] += 1
+            record.counters[f"rejected_{verdict.reason}"] += 1
+            record.rejections.append((now_ns, verdict))
+        else:
+            assert playback is not None
+            record.playback = follow(playback, verdict)
+            record.accepted_ns = now_ns
+            record.counters["plans_accepted"] += 1
+
+    def _enter(self, state: State, event: Event, now_ns: int) -> None:
+        record = self.record
+        before = record.state
+        reason = self.supervisor.why(event, now_ns)
+        record.note(now_ns, f"{before} -> {state}: {reason}")
+        record.counters[f"entered_{state.lower()}"] += 1
+        record.state, record.reason, record.since_ns = state, reason, now_ns
+        record.reset_until_ns = 0
+        if state is State.RAISING:
+            self._start_at(NEUTRAL, now_ns)
+            self._allow(self.config.patience.raising, now_ns)
+        elif state is State.PARKING:
+            if before not in RAISED:
+                self._start_from_measured(now_ns)
+            playback = record.playback
+            travel = 0.0 if playback is None else playback.remaining + playback.newest.way_home
+            self._allow(2.0 * (travel + self.config.patience.lowering), now_ns)
+        elif state in (State.PARKED, State.OFFLINE, State.SAFE):
+            # a device that stopped by itself plays nothing: what follows begins where it stands
+            record.playback = None
+            self.supervisor.device.forgive()
+
+    def _allow(self, seconds: float, now_ns: int) -> None:
+        self.record.deadline_ns = now_ns + int(seconds * SECOND)
+
+    def _start_at(self, pose: Array, now_ns: int) -> None:
+        record = self.record
+        record.playback = None
+        accepted = accept_rest(self.machine, pose, record.take_id(), self.homes, REACH)
+        if isinstance(accepted, Rejection):
+            self.supervisor.inconsistent = f"cannot stand here: {accepted}"
+            record.note(now_ns, self.supervisor.inconsistent)
+        else:
+            record.playback = Playback(accepted, accepted.plan.duration)
+        self.supervisor.device.forgive()
+
+    def _start_from_measured(self, now_ns: int) -> None:
+        newest, legs = self.supervisor.device.newest, self.supervisor.device.legs()
+        try:
+            if newest is not None and newest.pose is not None:
+                self._start_at(newest.pose, now_ns)
+            elif legs is not None:
+                self._start_at(forward(self.machine, legs), now_ns)
+            else:
+                self.supervisor.inconsistent = "the device measures neither legs nor pose"
+        except NoPoseError as error:
+            self.supervisor.inconsistent = str(error)
+
+    def _send(self, now_ns: int) -> Setpoint:
+        record = self.record
+        order = self._order(now_ns)
+        if record.playback is not None and order is Order.FOLLOW:
+            record.playback = advance(record.playback, self.config.send_period)
+            self._go_home(now_ns)
+        if record.playback is None:
+            state = PlatformState.at_rest(NEUTRAL)
+        else:
+            state = state_now(record.playback)
+        legs, speeds, _ = leg_motion(
+            self.machine, state.pose[None], state.velocity[None], state.acceleration[None]
+        )
+        inside = (legs[0] >= self.machine.leg_min) & (legs[0] <= self.machine.leg_max)
+        if not bool(inside.all()):
+            # cannot happen on an accepted plan: if it does, stand where the platform was last sent
+            self.supervisor.inconsistent = "an accepted plan led outside the stroke"
+            record.playback = None
+            return self._last
+        sent = Order.WAIT if self.config.dry_run else order
+        setpoint = Setpoint(sent, state, frozen(legs[0]))
+        if sent is Order.FOLLOW:
+            self.supervisor.astray = self.supervisor.device.track(now_ns, legs[0], speeds[0])
+        self._last = setpoint
+        record.counters["setpoints"] += 1
+        return setpoint
+
+    def _order(self, now_ns: int) -> Order:
+        record = self.record
+        standing = is_standing(record.playback)
+        if record.state is State.RAISING:
+            return Order.RAISE
+        if record.state in CUED:
+            return Order.FOLLOW
+        if record.state is State.PARKING:
+            return Order.PARK if self._is_home() else Order.FOLLOW
+        if record.state is State.FAULT and not standing:
+            return Order.FOLLOW
+        if record.state in (State.FAULT, State.SAFE) and record.reset_until_ns > now_ns:
+            return Order.RESET
+        newest = self.supervisor.device.newest
+        if record.state is State.FAULT and newest is not None and newest.faults:
+            return Order.PARK
+        return Order.WAIT
+
+    def _is_home(self) -> bool:
+        playback = self.record.playback
+        return playback is None or (
+            playback.is_at_rest and not np.any(playback.playing.plan.rest_pose)
+        )
+
+    def _go_home(self, now_ns: int) -> None:
+        """While parking: once at rest, begin the straight move to neutral."""
+        record, playback = self.record, self.record.playback
+        if record.state is not State.PARKING or playback is None:
+            return
+        if not playback.is_at_rest or self._is_home():
+            return
+        move = accept_move(
+            self.machine, playback.playing, playback.clock, NEUTRAL, record.take_id(), self.homes
+        )
+        if isinstance(move, Rejection):
+            self.supervisor.inconsistent = f"no way home: {move}"
+            record.note(now_ns, self.supervisor.inconsistent)
+        else:
+            record.playback = follow(playback, move)

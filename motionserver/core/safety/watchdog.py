@@ -1,0 +1,192 @@
+"""What the guard watches: ages in its own clock, the device's answers, tracking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.axes import Array
+from motionserver.core.device import Feedback
+from motionserver.core.kinematics.hexapod import leg_lengths
+from motionserver.core.limits import Machine
+from motionserver.core.state import DriveMode
+
+SECOND: Final = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long each silence is borne [s], and how far the platform may lag [m].
+
+    Attributes:
+        valid: Feedback without a break before it is believed.
+        feedback: Silence of the device while raised; at least six of its periods.
+        fresh: Source without a break before it moves the platform.
+        plans: Planner periods without an accepted plan.
+        hold: Longest hold.
+        pause: Longest hold of a source that says it pauses.
+        silence: Longest wait for a source while ready.
+        raising: Longest lift.
+        lowering: Bound of the device's own settling.
+        gap: Gap of the guard's own loop that is only an event.
+        reset: How long a reset is tried.
+        track: Tracking error that is always allowed [m].
+        track_lag: Further tracking error per leg speed [s].
+        track_time: How long a larger error is borne.
+    """
+
+    valid: float = 0.3
+    feedback: float = 0.1
+    fresh: float = 0.5
+    plans: int = 3
+    hold: float = 2.0
+    pause: float = 600.0
+    silence: float = 30.0
+    raising: float = 20.0
+    lowering: float = 10.0
+    gap: float = 0.3
+    reset: float = 2.0
+    track: float = 0.010
+    track_lag: float = 0.15
+    track_time: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class CueStatus:
+    """What the planner knows of the source, re-judged here by age.
+
+    Attributes:
+        newest_ns: Arrival of the newest believed packet, CLOCK_MONOTONIC [ns]; 0 = none yet.
+        stale_after_ns: Age beyond which it is stale [ns].
+        mode: What the simulator says it is doing.
+    """
+
+    newest_ns: int = 0
+    stale_after_ns: int = 0
+    mode: DriveMode = DriveMode.DRIVE
+
+    def is_stale(self, now_ns: int) -> bool:
+        """True if nothing came for too long, or ever."""
+        # a planner that claims more patience than 300 ms is not believed
+        patience = min(self.stale_after_ns, 3 * SECOND // 10)
+        return self.newest_ns == 0 or now_ns - self.newest_ns > patience
+
+
+class SourceWatch:
+    """Since when the source has been fresh and driving."""
+
+    def __init__(self) -> None:
+        self.status = CueStatus()
+        self._driving_since: int | None = None
+        self._silent_since: int | None = None
+
+    def update(self, now_ns: int, status: CueStatus | None) -> None:
+        """Take the newest status, or none, and judge its age now."""
+        self.status = status or self.status
+        if self.status.is_stale(now_ns):
+            self._driving_since = None
+            self._silent_since = now_ns if self._silent_since is None else self._silent_since
+            return
+        self._silent_since = None
+        if self.status.mode in (DriveMode.PAUSE, DriveMode.BYE):
+            self._driving_since = None
+        elif self._driving_since is None:
+            self._driving_since = now_ns
+
+    def is_fresh(self, now_ns: int) -> bool:
+        """True if packets arrive, whatever they say."""
+        return not self.status.is_stale(now_ns)
+
+    @property
+    def is_paused(self) -> bool:
+        """True if the newest packet says the simulator pauses."""
+        return self.status.mode is DriveMode.PAUSE
+
+    def driving_for(self, now_ns: int) -> float:
+        """How long it has been fresh and driving without a break [s]."""
+        return 0.0 if self._driving_since is None else (now_ns - self._driving_since) / SECOND
+
+    def silent_for(self, now_ns: int) -> float:
+        """How long it has been stale without a break [s]."""
+        return 0.0 if self._silent_since is None else (now_ns - self._silent_since) / SECOND
+
+
+class DeviceWatch:
+    """The device's newest answer, since when it is valid, and how far the platform lags."""
+
+    def __init__(self, machine: Machine, patience: Patience, send_period: float) -> None:
+        self._machine = machine
+        self._patience = patience
+        self._late = max(patience.feedback, 6.0 * send_period)
+        self._valid_since: int | None = None
+        self._astray_since: int | None = None
+        self._excused: Feedback | None = None
+        self._excused_ns = 0
+        self.newest: Feedback | None = None
+        self.error = 0.0
+
+    def answered(self, feedback: Feedback) -> None:
+        """Take a decoded answer."""
+        if self._valid_since is None or self.is_lost(feedback.arrival_ns):
+            self._valid_since = feedback.arrival_ns
+        self.newest = feedback
+
+    def age(self, now_ns: int) -> float:
+        """Age of the newest answer [s]; infinite before the first."""
+        return float("inf") if self.newest is None else (now_ns - self.newest.arrival_ns) / SECOND
+
+    def is_lost(self, now_ns: int) -> bool:
+        """True if the device has been silent for too long."""
+        if self._excused is not None and self._excused is self.newest:
+            return (now_ns - self._excused_ns) / SECOND > self._late
+        return self.age(now_ns) > self._late
+
+    def excuse(self, now_ns: int) -> None:
+        """The guard itself stood still, and a base answers what it is sent: wait anew, once."""
+        if self.newest is not None and self._excused is not self.newest:
+            self._excused, self._excused_ns = self.newest, now_ns
+
+    def valid_for(self, now_ns: int) -> float:
+        """How long answers have come without a break [s]."""
+        if self._valid_since is None or self.is_lost(now_ns):
+            return 0.0
+        return (now_ns - self._valid_since) / SECOND
+
+    def legs(self) -> Array | None:
+        """Measured pin-to-pin lengths, (6,) [m]; None if unknown."""
+        if self.newest is None:
+            return None
+        if self.newest.legs is not None:
+            return self.newest.legs
+        return None if self.newest.pose is None else leg_lengths(self._machine, self.newest.pose)
+
+    def track(self, now_ns: int, legs: Array, speeds: Array) -> bool:
+        """Compare with what was commanded.
+
+        Args:
+            now_ns: Now [ns].
+            legs: Commanded lengths, (6,) [m].
+            speeds: Commanded leg speeds, (6,) [m/s].
+
+        Returns:
+            True if the platform has been astray for too long.
+        """
+        measured = self.legs()
+        if measured is None:
+            return False
+        gap = np.abs(measured - legs)
+        self.error = float(gap.max())
+        allowed = self._patience.track + self._patience.track_lag * np.abs(speeds)
+        if bool(np.all(gap <= allowed)):
+            self._astray_since = None
+            return False
+        if self._astray_since is None:
+            self._astray_since = now_ns
+        return (now_ns - self._astray_since) / SECOND > self._patience.track_time
+
+    def forgive(self) -> None:
+        """Start tracking anew: the platform is about to be told something else."""
+        self._astray_since = None
+        self.error = 0.0

@@ -1,0 +1,35 @@
+"""All errors of the server, one tree.
+
+MotionServerError
+    ConfigError                a file or key a person must mend
+    PluginError                a plug-in that does not load
+    PlatformPacketError        bytes on the platform's port that are no answer (platforms.base)
+    SourceError                bytes of a simulator that are no sample (sources.base)
+    RecordingError             a recording that cannot be read (evaluate.recording)
+"""
+
+from __future__ import annotations
+
+
+class MotionServerError(Exception):
+    """Base of everything the server raises on purpose."""
+
+
+class ConfigError(MotionServerError):
+    """A setting is wrong.
+
+    Attributes:
+        where: File and key.
+        what: What is wrong with it.
+        do: What to do.
+    """
+
+    def __init__(self, where: str, what: str, do: str) -> None:
+        super().__init__(f"{where}: {what}. {do}")
+        self.where = where
+        self.what = what
+        self.do = do
+
+
+class PluginError(MotionServerError):
+    """A plug-in named by an entry point does not load; the start is stopped."""

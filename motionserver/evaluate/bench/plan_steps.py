@@ -1,0 +1,187 @@
+"""Plan and check in lock-step, with a stopwatch: one case of the plan benchmark."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from time import monotonic, perf_counter_ns, sleep, thread_time_ns
+from typing import Final
+
+import numpy as np
+from motion_clients.recording import RecordedSample, read_recording, recording_path
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.intake.intake import Head, Intake
+from motionserver.core.kinematics.rotation import gravity_in_body
+from motionserver.core.limits import Machine
+from motionserver.core.motion.player import Playback, advance, follow
+from motionserver.core.plan import Plan, pack
+from motionserver.core.safety.accept import accept_proposal, accept_rest
+from motionserver.core.safety.verdict import Rejection
+from motionserver.core.state import PlatformState, Stimulus, VehicleMotion
+from motionserver.cueing.base import Candidate, Cueing, Report
+from motionserver.cueing.think import Thinker
+from motionserver.cueing.tuning import Tuning
+from motionserver.evaluate.bench.processes import BenchError
+from motionserver.evaluate.bench.report import Row, row_of_samples
+
+PERIOD: Final = 0.01
+RECORDING: Final = "truck_lanechange_slalom"
+KERNEL_SIZE: Final = 96
+"""Rows of the square matrices whose product is the yardstick."""
+_KERNEL_EVERY: Final = 5
+
+
+@dataclass(slots=True)
+class Clocked:
+    """A cueing algorithm with a stopwatch around its `propose`."""
+
+    inner: Cueing
+    name: str = "clocked"
+    propose_ns: int = 0
+
+    @property
+    def disturbance(self) -> Array:
+        """The algorithm's."""
+        return self.inner.disturbance
+
+    @disturbance.setter
+    def disturbance(self, value: Array) -> None:
+        self.inner.disturbance = value
+
+    def propose(
+        self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus
+    ) -> Candidate | None:
+        """Time the algorithm's."""
+        began = perf_counter_ns()
+        candidate = self.inner.propose(start, parent, takeover, stimulus)
+        self.propose_ns = perf_counter_ns() - began
+        return candidate
+
+    def adopt(self, plan: Plan, kappa: float) -> None:
+        """The algorithm's."""
+        self.inner.adopt(plan, kappa)
+
+    def retune(self, tuning: Tuning) -> None:
+        """The algorithm's."""
+        self.inner.retune(tuning)
+
+    def report(self) -> Report:
+        """The algorithm's."""
+        return self.inner.report()
+
+
+@dataclass(slots=True)
+class Times:
+    """What one case took, per period [ns], and what became of its plans."""
+
+    period: list[int] = field(default_factory=list)
+    cpu: list[int] = field(default_factory=list)
+    propose: list[int] = field(default_factory=list)
+    govern: list[int] = field(default_factory=list)
+    verify: list[int] = field(default_factory=list)
+    kernel: list[int] = field(default_factory=list)
+    iterations: list[int] = field(default_factory=list)
+    outcomes: Counter[str] = field(default_factory=Counter)
+
+    def rows(self, name: str) -> list[Row]:
+        """The whole period first, then its parts, then the guard's own check."""
+        count = len(self.period)
+        kernel = float(np.median(self.kernel)) if self.kernel else 1.0
+        iterations = np.asarray(self.iterations)
+        shares = {
+            what: f"{self.outcomes[what] / count:.2%}"
+            for what in ("no plan", "attenuated", "refused", "rejected by guard")
+        }
+        notes = {
+            "kernels (p50)": round(float(np.median(self.period)) / kernel, 1),
+            "iterations p50": int(np.quantile(iterations, 0.5)),
+            "max": int(iterations.max()),
+            **shares,
+        }
+        return [
+            row_of_samples(name, self.period, **notes),
+            row_of_samples("  CPU time of it", self.cpu),
+            row_of_samples("  propose", self.propose),
+            row_of_samples("  govern", self.govern),
+            row_of_samples("  guard's check", self.verify),
+        ]
+
+
+def time_plans(machine: Machine, tuning: Tuning, seconds: float) -> Times:
+    """Drive for ``seconds`` [s] of the recording at 100 Hz and time every planner period.
+
+    Each period takes the packet in, proposes, governs with the planner's check and packs; the
+    guard's acceptance is timed beside it. Plans take over one period later, as live.
+    """
+    homes = np.stack((np.zeros(6), machine.parked_pose))
+    rest = accept_rest(machine, np.zeros(6), 0, homes)
+    if isinstance(rest, Rejection):
+        raise BenchError(f"bench plan: {machine.name} cannot stand at neutral ({rest})")
+    thinker = Thinker(machine, tuning, PERIOD, homes)
+    intake, head = Intake(), Head(np.zeros(3), tuning.scale)
+    playback, out = Playback(rest), Times()
+    left = right = np.random.default_rng(0).standard_normal((KERNEL_SIZE, KERNEL_SIZE))
+    clocked: Clocked = Clocked(thinker.cueing)
+    due = monotonic()
+    for number, motion in zip(range(1, int(seconds / PERIOD) + 1), _motions(), strict=False):
+        if thinker.cueing is not clocked:
+            # at the start, and after it raised: the thinker makes a fresh one then
+            clocked = Clocked(thinker.cueing)
+            thinker.cueing = clocked
+        due += PERIOD
+        sleep(max(0.0, due - monotonic()))
+        parent = playback.newest
+        takeover = playback.newest_clock + PERIOD
+        began, began_cpu = perf_counter_ns(), thread_time_ns()
+        intake.offer(motion)
+        stimulus = intake.stimulus(head, PERIOD, wanted=True)
+        aware = perf_counter_ns()
+        thought = thinker.think(parent.plan, parent.before, takeover, stimulus, number)
+        thought_ns = perf_counter_ns() - aware
+        if thought.proposal is not None:
+            pack(thought.proposal.plan)
+        out.period.append(perf_counter_ns() - began)
+        out.cpu.append(thread_time_ns() - began_cpu)
+        out.propose.append(clocked.propose_ns)
+        out.govern.append(thought_ns - clocked.propose_ns)
+        out.iterations.append(thought.report.iterations)
+        if thought.proposal is None:
+            out.outcomes["no plan"] += 1
+        else:
+            kappa = thought.proposal.kappa
+            out.outcomes["attenuated" if 0.0 < kappa < 1.0 else "whole"] += kappa > 0.0
+            out.outcomes["refused"] += kappa == 0.0
+            began = perf_counter_ns()
+            plan, now = thought.proposal.plan, playback.newest_clock
+            verdict = accept_proposal(machine, plan, parent, now, homes)
+            out.verify.append(perf_counter_ns() - began)
+            if isinstance(verdict, Rejection):
+                out.outcomes["rejected by guard"] += 1
+            else:
+                playback = follow(playback, verdict)
+        playback = advance(playback, PERIOD)
+        if number % _KERNEL_EVERY == 0:
+            began = perf_counter_ns()
+            left = left @ right / KERNEL_SIZE
+            out.kernel.append(perf_counter_ns() - began)
+    return out
+
+
+def _motions() -> Iterator[VehicleMotion]:
+    """The recording at 100 Hz, forwards and backwards in turn: no jump where it begins anew."""
+    samples = read_recording(recording_path(RECORDING)).samples
+    number = 0
+    while True:
+        for sample in samples if (number // len(samples)) % 2 == 0 else reversed(samples):
+            stamp = round(number * PERIOD * 1e9)
+            force = frozen(np.asarray(sample.acceleration) + _gravity(sample))
+            rates = frozen(sample.rates)
+            yield VehicleMotion(stamp, 1, number, stamp, force, rates, sample.speed)
+            number += 1
+
+
+def _gravity(sample: RecordedSample) -> Array:
+    roll, pitch = sample.attitude
+    return gravity_in_body(np.array(roll), np.array(pitch))

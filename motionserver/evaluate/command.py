@@ -1,0 +1,165 @@
+"""The command ``evaluate``: one recording, some algorithms, and always the same rivals."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from motionserver.core.limits import Machine
+from motionserver.cueing.registry import algorithms as known_algorithms
+from motionserver.cueing.tuning import Tuning
+from motionserver.errors import ConfigError
+from motionserver.evaluate.drive import RATE_HZ, Drive, no_motion
+from motionserver.evaluate.lockstep import PLANNER_HZ, drive
+from motionserver.evaluate.metrics.figures import figures_of
+from motionserver.evaluate.page import to_html
+from motionserver.evaluate.recording import Recording, read_recording
+from motionserver.evaluate.result import EvaluateResult, to_json
+from motionserver.evaluate.setpoints import write_setpoints
+from motionserver.evaluate.yardstick import find_yardstick
+from motionserver.settings.machine import load_machine
+
+
+def evaluate(
+    input_csv: str | Path,
+    algorithms: Sequence[str] = ("thondel2014", "classical"),
+    machine: Machine | None = None,
+    scale: float | None = None,
+    rate: float = RATE_HZ,
+    setpoints: str | Path | None = None,
+    json_out: str | Path | None = None,
+    html_out: str | Path | None = None,
+    *,
+    tuning: Tuning | None = None,
+    planner_hz: float = PLANNER_HZ,
+    preview: float = 0.0,
+    jobs: int = 2,
+    quiet: bool = False,
+) -> EvaluateResult:
+    """Drive a recording with every algorithm and with the rivals, and judge them all.
+
+    Progress goes to standard error. `motionserver.evaluate.report.to_text` gives the table.
+
+    Args:
+        input_csv: The recording.
+        algorithms: Names, in the order of the table.
+        machine: Platform; the preset t2-compact if None.
+        scale: Share of the motion that is wanted, above 0 and at most 1; the tuning's if None.
+        rate: Rate of the executed samples [Hz].
+        setpoints: File for the set-points; takes exactly one algorithm.
+        json_out: File for all figures as JSON.
+        html_out: File for the page.
+        tuning: Other tunables; the defaults if None.
+        planner_hz: Planner rate [Hz].
+        preview: How far the algorithms (not the rivals) are told the recording ahead [s]; 0 as in
+            life without a simulator that knows. The upper bound of what prediction can bring.
+        jobs: Processes for the yardstick's search; the result does not depend on it.
+        quiet: True for no progress.
+
+    Returns:
+        Drives and figures: the algorithms as asked for, "yardstick", "no motion".
+
+    Raises:
+        ConfigError: An argument is wrong.
+        RecordingError: The recording cannot be read.
+    """
+    machine = load_machine("t2-compact") if machine is None else machine
+    base = tuning or Tuning()
+    base = base if scale is None else replace(base, scale=scale)
+    _check(algorithms, base.scale, rate, planner_hz, setpoints)
+    for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
+        _check_folder(option, path)
+    recording = read_recording(input_csv)
+
+    def tell(text: str) -> None:
+        if not quiet:
+            print(f"{recording.name}: {text}", file=sys.stderr, flush=True)  # noqa: T201
+
+    drives = [
+        _timed(machine, recording, replace(base, algorithm=name), rate, planner_hz, preview, tell)
+        for name in algorithms
+    ]
+    if setpoints is not None:
+        write_setpoints(drives[0], setpoints)
+    yardstick = find_yardstick(
+        machine, recording, base, rate=rate, planner_hz=planner_hz, jobs=jobs, tell=tell
+    )
+    drives += [yardstick.drive, no_motion(machine, recording, base.scale, rate)]
+    result = EvaluateResult(
+        recording,
+        machine,
+        base,
+        rate,
+        planner_hz,
+        preview,
+        tuple(drives),
+        tuple(figures_of(driven) for driven in drives),
+        yardstick,
+    )
+    if json_out is not None:
+        Path(json_out).write_text(to_json(result), encoding="utf-8")
+    if html_out is not None:
+        Path(html_out).write_text(to_html(result), encoding="utf-8")
+    return result
+
+
+def _timed(
+    machine: Machine,
+    recording: Recording,
+    tuning: Tuning,
+    rate: float,
+    planner_hz: float,
+    preview: float,
+    tell: Callable[[str], None],
+) -> Drive:
+    begun = perf_counter()
+    driven = drive(machine, recording, tuning, rate=rate, planner_hz=planner_hz, preview=preview)
+    took = perf_counter() - begun
+    tell(f"{tuning.algorithm}: {recording.duration:.1f} s driven in {took:.1f} s")
+    return driven
+
+
+def _check(
+    algorithms: Sequence[str],
+    scale: float,
+    rate: float,
+    planner_hz: float,
+    setpoints: str | Path | None,
+) -> None:
+    known = known_algorithms()
+    for name in algorithms:
+        if name not in known:
+            raise ConfigError(
+                "--algorithm", f"unknown algorithm {name!r}", f"Allowed: {', '.join(known)}."
+            )
+    if not algorithms or len(set(algorithms)) < len(algorithms):
+        raise ConfigError(
+            "--algorithm",
+            f"{len(algorithms)} given, each may stand once and one is needed",
+            f"Give one or more of {', '.join(known)}, separated by commas.",
+        )
+    if not 0.0 < scale <= 1.0:
+        raise ConfigError("--scale", f"{scale:g} is out of range", "Give a share in (0, 1].")
+    if not 10.0 <= rate <= 2000.0:
+        raise ConfigError("--rate", f"{rate:g} Hz is out of range", "Give 10 to 2000 Hz.")
+    if not 20.0 <= planner_hz <= 250.0:
+        raise ConfigError(
+            "--planner-rate", f"{planner_hz:g} Hz is out of range", "Give 20 to 250 Hz."
+        )
+    if setpoints is not None and len(algorithms) != 1:
+        raise ConfigError(
+            "--setpoints",
+            f"one algorithm moves one platform; {len(algorithms)} are given",
+            "Give exactly one name to --algorithm.",
+        )
+
+
+def _check_folder(option: str, path: str | Path | None) -> None:
+    """Refuse before minutes of work what could not be written after them."""
+    if path is not None and (not Path(path).parent.is_dir() or Path(path).is_dir()):
+        raise ConfigError(
+            f"{option} {path}", "is no file in an existing folder", "Name a file to write."
+        )

@@ -1,0 +1,216 @@
+"""Think and act in lock-step on a manual clock: the server's own code, faster than real time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.intake.freshness import SECOND_NS
+from motionserver.core.intake.gate import Gate
+from motionserver.core.intake.intake import Head, Intake
+from motionserver.core.limits import Machine
+from motionserver.core.motion.player import Playback, advance, follow, state_now
+from motionserver.core.safety.accept import accept_proposal, accept_rest
+from motionserver.core.safety.verdict import AcceptedPlan, Rejection
+from motionserver.core.state import Preview, VehicleMotion
+from motionserver.cueing.think import Thinker
+from motionserver.cueing.tuning import Tuning
+from motionserver.evaluate.drive import RATE_HZ, Drive, Periods, assemble
+from motionserver.evaluate.recording import Recording
+
+PLANNER_HZ: Final = 100.0
+"""Planner rate unless told otherwise [Hz]."""
+PREVIEW_STEP: Final = 0.05
+"""Spacing of a preview's samples [s]."""
+Progress = Callable[[float], None]
+
+
+@dataclass(slots=True)
+class _Log:
+    times: list[float] = field(default_factory=list)
+    kappa: list[float] = field(default_factory=list)
+    iterations: list[int] = field(default_factory=list)
+    x_max: list[Array] = field(default_factory=list)
+    force: list[Array] = field(default_factory=list)
+    rates: list[Array] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    refusals: Counter[str] = field(default_factory=Counter)
+    rejections: Counter[str] = field(default_factory=Counter)
+    troubles: Counter[str] = field(default_factory=Counter)
+    gate: Counter[str] = field(default_factory=Counter)
+
+    def periods(self) -> Periods:
+        return Periods(
+            frozen(self.times),
+            frozen(self.kappa),
+            frozen(self.iterations),
+            frozen(self.x_max),
+            frozen(self.force),
+            frozen(self.rates),
+            frozen(self.seconds),
+            dict(sorted(self.refusals.items())),
+            dict(sorted(self.rejections.items())),
+            dict(sorted(self.troubles.items())),
+            dict(sorted(self.gate.items())),
+        )
+
+
+def drive(
+    machine: Machine,
+    recording: Recording,
+    tuning: Tuning,
+    *,
+    rate: float = RATE_HZ,
+    planner_hz: float = PLANNER_HZ,
+    vehicle_head: Array | None = None,
+    preview: float = 0.0,
+    thinker: Thinker | None = None,
+    progress: Progress | None = None,
+) -> Drive:
+    """Drive a recording through gate, intake, planner, governor, verification and player.
+
+    It begins at neutral, running, without fade-in, and ends with the last sample. Every plan takes
+    over one planner period after it was begun, as it does live.
+
+    Args:
+        machine: Geometry and hard limits.
+        recording: What the vehicle did.
+        tuning: Algorithm and tunables; its scale is the share of the motion that is wanted.
+        rate: Rate of the executed samples [Hz].
+        planner_hz: Planner rate [Hz].
+        vehicle_head: Driver's head from the recorded point, vehicle axes, (3,) [m]; zero if None.
+        preview: How far the recording itself is told ahead, as by a simulator that knows what
+            comes [s]; 0 for none.
+        thinker: Another planner than that of ``tuning``.
+        progress: Called about once per second of the drive with the share done, 0..1.
+
+    Returns:
+        Everything wanted and executed.
+
+    Raises:
+        ValueError: A rate is not positive, or neutral is no pose of this machine.
+    """
+    if not (np.isfinite(rate) and rate > 0.0 and np.isfinite(planner_hz) and planner_hz > 0.0):
+        raise ValueError(
+            f"rates must be positive: sample rate {rate:g} Hz, planner rate {planner_hz:g} Hz"
+        )
+    period = 1.0 / planner_hz
+    homes = machine.parked_pose[None]
+    head = Head(np.zeros(3) if vehicle_head is None else vehicle_head, tuning.scale)
+    mind = Thinker(machine, tuning, period, homes) if thinker is None else thinker
+    playback = Playback(_standing(machine, homes))
+    intake, gate, log = Intake(gain=1.0), Gate(), _Log()
+
+    samples = int(np.floor(recording.duration * rate + 1e-6)) + 1
+    states = np.empty((samples, 18))
+    count, given, now = 0, 0, 0.0
+    for number in range(int(np.floor(recording.duration * planner_hz + 1e-6)) + 1):
+        start, end = number / planner_hz, (number + 1) / planner_hz
+        playback, now = advance(playback, start - now), start
+        now_ns = round(start * SECOND_NS)
+        given = _hear(recording, given, start, preview, gate, intake, log)
+        wanted = intake.stimulus(head, period, not gate.freshness.is_stale(now_ns))
+
+        before = perf_counter()
+        parent = playback.newest
+        thought = mind.think(
+            parent.plan, parent.before, playback.newest_clock + period, wanted, number + 1
+        )
+        log.seconds.append(perf_counter() - before)
+        log.times.append(start)
+        log.force.append(wanted.force)
+        log.rates.append(wanted.rates)
+        log.iterations.append(thought.report.iterations)
+        log.x_max.append(thought.report.x_max)
+        if thought.proposal is None:
+            log.kappa.append(float("nan"))
+            log.troubles[thought.trouble] += 1
+        else:
+            log.kappa.append(thought.proposal.kappa)
+            if thought.proposal.refusals:
+                log.refusals[str(thought.proposal.refusals[0].reason)] += 1
+            plan = thought.proposal.plan
+            verdict = accept_proposal(machine, plan, parent, playback.newest_clock, homes)
+            if isinstance(verdict, Rejection):
+                log.rejections[str(verdict.reason)] += 1
+            else:
+                playback = follow(playback, verdict)
+
+        while count < samples and (instant := count / rate) < end - 1e-9:
+            playback, now = advance(playback, max(0.0, instant - now)), max(now, instant)
+            state = state_now(playback)
+            states[count] = np.concatenate((state.pose, state.velocity, state.acceleration))
+            count += 1
+        if progress is not None and number % round(max(planner_hz, 1.0)) == 0:
+            progress(count / samples)
+    return assemble(
+        tuning.algorithm,
+        machine,
+        recording,
+        rate,
+        (states[:count, :6], states[:count, 6:12], states[:count, 12:]),
+        tuning.scale,
+        vehicle_head,
+        log.periods(),
+    )
+
+
+def _standing(machine: Machine, homes: Array) -> AcceptedPlan:
+    rest = accept_rest(machine, np.zeros(6), 0, homes)
+    if isinstance(rest, Rejection):
+        raise ValueError(
+            f"machine {machine.name}: the platform cannot stand at neutral ({rest}); "
+            "check its legs and joints"
+        )
+    return rest
+
+
+def _hear(
+    recording: Recording,
+    given: int,
+    now: float,
+    preview: float,
+    gate: Gate,
+    intake: Intake,
+    log: _Log,
+) -> int:
+    """Offer every sample that has arrived by ``now`` [s]; return how many are given."""
+    while given < len(recording.times) and recording.times[given] <= now + 1e-9:
+        stamp = round(float(recording.times[given]) * SECOND_NS)
+        motion = VehicleMotion(
+            stamp,
+            1,
+            given,
+            stamp,
+            recording.force[given],
+            recording.rates[given],
+            float(recording.speed[given]),
+            preview=_preview(recording, given, preview) if preview > 0.0 else None,
+        )
+        refusal = gate.refuse("recording", recording.name, motion)
+        if refusal is None:
+            intake.offer(motion)
+        else:
+            log.gate[refusal] += 1
+        given += 1
+    return given
+
+
+def _preview(recording: Recording, given: int, seconds: float) -> Preview | None:
+    """What the recording holds after sample ``given``, as far as it goes."""
+    now = recording.times[given]
+    ahead = now + np.arange(1, int(seconds / PREVIEW_STEP) + 1) * PREVIEW_STEP
+    ahead = ahead[ahead <= recording.times[-1] + 1e-9]
+    if len(ahead) == 0:
+        return None
+    columns = [
+        np.interp(ahead, recording.times, c) for c in (*recording.force.T, *recording.rates.T)
+    ]
+    both = np.column_stack(columns)
+    return Preview(frozen(ahead - now), frozen(both[:, :3]), frozen(both[:, 3:]))

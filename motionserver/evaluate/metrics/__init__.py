@@ -1,0 +1,1 @@
+"""Figures of fidelity and of the workspace, on executed samples."""

@@ -1,0 +1,207 @@
+"""The report as one self-contained HTML page with inline plots."""
+
+from __future__ import annotations
+
+from html import escape
+from math import degrees
+from typing import Final
+
+import numpy as np
+
+from motionserver import __version__
+from motionserver.core.axes import Axis
+from motionserver.evaluate.drive import Drive
+from motionserver.evaluate.metrics.comfort import tilt_rate
+from motionserver.evaluate.report import remarks
+from motionserver.evaluate.result import EvaluateResult
+from motionserver.evaluate.rows import sections
+from motionserver.evaluate.svg import STYLE as PLOT_STYLE
+from motionserver.evaluate.svg import Curve, Panel, figure
+from motionserver.evaluate.yardstick import RULE
+
+STYLE: Final = """
+:root{color-scheme:light dark;--paper:#fbfbfa;--card:#fff;--ink:#1d2430;--soft:#667085;
+--line:#e3e6ea;--bad:#c8372d;--good:#12805c;--c0:#98a1b0;--c1:#2563c9;--c2:#d9730d;--c3:#159a6b;
+--c4:#8b4fc4;--c5:#c2417c}
+@media(prefers-color-scheme:dark){:root{--paper:#14171c;--card:#1b1f26;--ink:#e7eaf0;--soft:#98a2b3;
+--line:#2c323c;--bad:#f0685e;--good:#4cc38a;--c0:#7f8a9c;--c1:#6ea8fe;--c2:#f5a04c;--c3:#4cc38a;
+--c4:#b794f4;--c5:#f28fb5}}
+*{box-sizing:border-box}
+body{margin:0 auto;max-width:1060px;padding:32px 24px 64px;background:var(--paper);color:var(--ink);
+font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
+h1{font-size:26px;line-height:1.2;margin:0 0 4px}h2{font-size:18px;margin:40px 0 12px}
+p{margin:6px 0}.soft{color:var(--soft)}code{font:13px ui-monospace,monospace}
+.cards{display:flex;flex-wrap:wrap;gap:12px;margin:20px 0}
+.card{flex:1 1 150px;background:var(--card);border:1px solid var(--line);border-radius:10px;
+padding:12px 16px}.card b{display:block;font-size:26px;line-height:1.25;font-weight:650;
+font-variant-numeric:tabular-nums}.card span{color:var(--soft);font-size:13px}
+.good b{color:var(--good)}.poor b{color:var(--bad)}
+.frame{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:10px 12px;
+margin:0 0 16px;overflow-x:auto}
+table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
+th,td{padding:4px 12px;text-align:right;white-space:nowrap}
+th:first-child,td:first-child{text-align:left;white-space:normal}
+thead th{border-bottom:1px solid var(--line);font-size:13px}
+tbody tr+tr td{border-top:1px solid var(--line)}
+tbody th{padding-top:18px;font-size:13px;color:var(--soft);text-transform:none;text-align:left}
+td.best{font-weight:700}td.bad{color:var(--bad);font-weight:700}
+"""
+
+
+def to_html(result: EvaluateResult) -> str:
+    """The whole page; it needs nothing but itself."""
+    recording, machine = result.recording, result.machine
+    title = f"{recording.name}: felt against wanted"
+    facts = (
+        f"{recording.duration:.1f} s at scale {result.tuning.scale:g} on {machine.name} "
+        f"<code>{machine.digest}</code>, planner {result.planner_hz:g} Hz, judged on executed "
+        f"samples at {result.rate:g} Hz. motionserver {__version__}."
+    )
+    plots = "".join(
+        f'<h2>{escape(name)}</h2><div class="frame">{figure(panels)}</div>'
+        for name, panels in _plots(result)
+    )
+    notes = "".join(f"<p>{escape(line)}.</p>" for line in remarks(result))
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}{PLOT_STYLE}</style></head><body>"
+        f'<h1>{escape(title)}</h1><p class="soft">{facts}</p>{_cards(result)}{notes}'
+        f'<p class="soft">Yardstick: {escape(RULE)}. Its gain here: '
+        f"{result.yardstick.gain:g}.</p>{plots}<h2>All figures</h2>"
+        f'<div class="frame">{_table(result)}</div></body></html>\n'
+    )
+
+
+def _cards(result: EvaluateResult) -> str:
+    still = result.of("no motion").rmse_xy
+    cards = [
+        (
+            f"{result.violations}",
+            "samples beyond a limit",
+            "good" if result.violations == 0 else "poor",
+        )
+    ]
+    for figures in result.figures:
+        if figures.name == "no motion":
+            cards.append((f"{figures.rmse_xy:.3f}", "RMSE(x, y) of no motion [m/s²]", ""))
+        else:
+            name = (
+                figures.name
+                if figures.name != "yardstick"
+                else (f"yardstick (gain {result.yardstick.gain:g})")
+            )
+            won = 100.0 * (1.0 - figures.rmse_xy / still) if still > 0.0 else 0.0
+            cards.append(
+                (
+                    f"{figures.rmse_xy:.3f}",
+                    f"RMSE(x, y) of {name}: {won:+.0f} % felt error saved",
+                    "",
+                )
+            )
+    return (
+        '<div class="cards">'
+        + "".join(
+            f'<div class="card {kind}"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
+            for value, text, kind in cards
+        )
+        + "</div>"
+    )
+
+
+def _table(result: EvaluateResult) -> str:
+    names = [figures.name for figures in result.figures]
+    head = "".join(f"<th>{escape(name)}</th>" for name in names)
+    out = [f"<table><thead><tr><th></th>{head}</tr></thead>"]
+    for section in sections(result):
+        out.append(f'<tbody><tr><th colspan="{len(names) + 1}">{escape(section.title)}</th></tr>')
+        for row in section.rows:
+            cells = "".join(
+                f'<td class="{"bad" if i in row.bad else "best" if i in row.best else ""}">'
+                f"{escape(cell)}</td>"
+                for i, cell in enumerate(row.cells)
+            )
+            out.append(f"<tr><td>{escape(row.label)}</td>{cells}</tr>")
+        out.append("</tbody>")
+    return "".join(out) + "</table>"
+
+
+def _plots(result: EvaluateResult) -> list[tuple[str, list[Panel]]]:
+    movers = [drive for drive in result.drives if drive.name != "no motion"]
+    out = [
+        ("Specific force at the head", _force_panels(movers)),
+        ("Body rates", _rate_panels(movers)),
+    ]
+    out += [(f"Platform under {drive.name}", _platform_panels(drive)) for drive in movers]
+    return out
+
+
+def _moves(curves: list[Curve]) -> bool:
+    """Whether there is anything to see."""
+    return any(float(np.max(np.abs(curve.values))) > 1e-6 for curve in curves)
+
+
+def _force_panels(movers: list[Drive]) -> list[Panel]:
+    panels = []
+    for axis, name in enumerate(("f_x, forward", "f_y, left", "f_z, up, gravity removed")):
+        curves = [Curve("wanted", movers[0].wanted_force[:, axis], 0)]
+        curves += [
+            Curve(d.name, d.felt()[0][:, axis], 1 + i % 5)
+            for i, d in reversed([*enumerate(movers)])
+        ]
+        if _moves(curves):
+            panels.append(Panel(f"{name} [m/s²]", movers[0].times, curves, height=220))
+    return panels
+
+
+def _rate_panels(movers: list[Drive]) -> list[Panel]:
+    panels = []
+    for axis, name in enumerate(("roll rate", "pitch rate", "yaw rate")):
+        curves = [Curve("wanted", np.degrees(movers[0].wanted_rates[:, axis]), 0)]
+        curves += [
+            Curve(d.name, np.degrees(d.felt()[1][:, axis]), 1 + i % 5)
+            for i, d in reversed([*enumerate(movers)])
+        ]
+        if _moves(curves):
+            panels.append(Panel(f"{name} [deg/s]", movers[0].times, curves, height=170))
+    tilting = [
+        Curve(d.name, np.degrees(tilt_rate(d.wanted_rates, d.felt()[1])), 1 + i % 5)
+        for i, d in reversed([*enumerate(movers)])
+    ]
+    panels.append(
+        Panel("tilt rate nobody asked for [deg/s]", movers[0].times, tilting, limits=(3.0,))
+    )
+    return panels
+
+
+def _platform_panels(drive: Drive) -> list[Panel]:
+    machine, times = drive.machine, drive.times
+    names = [axis.name.lower() for axis in Axis]
+    places = [Curve(names[i], 1e3 * drive.pose[:, i], (1, 2, 3)[i]) for i in range(3)]
+    angles = [Curve(names[i], np.degrees(drive.pose[:, i]), (1, 2, 3)[i - 3]) for i in (3, 4, 5)]
+    legs = [Curve(f"leg {i + 1}", 1e3 * drive.legs[:, i], i) for i in range(6)]
+    ends = (1e3 * machine.leg_min, 1e3 * machine.leg_max)
+    panels = [
+        Panel("place [mm]", times, places),
+        Panel("attitude [deg]", times, angles),
+        Panel("legs, pin to pin, and the ends of their stroke [mm]", times, legs, ends),
+    ]
+    periods = drive.periods
+    if periods is None:
+        return panels
+    limits = [
+        Curve(f"{names[i]} [mm or deg]", (1e3 if i < 3 else degrees(1.0)) * periods.x_max[:, i], c)
+        for i, c in ((0, 1), (1, 2), (3, 3), (4, 4))
+    ]
+    kappa = Curve("", np.nan_to_num(periods.kappa), 1)
+    return [
+        *panels,
+        Panel("X_max: position limits in force", periods.times, limits, bounds=(0.0, 240.0)),
+        Panel(
+            "kappa: share of the candidate that was let through",
+            periods.times,
+            [kappa],
+            height=120,
+            bounds=(-0.05, 1.05),
+        ),
+    ]

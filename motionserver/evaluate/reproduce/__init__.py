@@ -1,0 +1,1 @@
+"""Published results, redrawn by the server's own code."""

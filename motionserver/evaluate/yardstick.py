@@ -1,0 +1,107 @@
+"""The rival that counts: the classical washout with the gain that suits this recording best."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+from motionserver.core.limits import Machine
+from motionserver.cueing.tuning import Tuning
+from motionserver.evaluate.drive import RATE_HZ, Drive
+from motionserver.evaluate.lockstep import PLANNER_HZ, drive
+from motionserver.evaluate.metrics.figures import rmse_xy
+from motionserver.evaluate.recording import Recording
+
+COARSE: Final = (0.2, 0.4, 0.6, 0.8, 1.0)
+"""Gains tried first."""
+STEPS: Final = (0.1, 0.05)
+"""Then to both sides of the best."""
+RULE: Final = (
+    "classical washout under the same limits and governor, with the gain in (0, 1] of least "
+    "RMSE(x, y) on this very recording: tried 0.2, 0.4, 0.6, 0.8, 1.0, then 0.1 and 0.05 to both "
+    "sides of the best"
+)
+"""How the yardstick is chosen, for people."""
+
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Yardstick:
+    """The best scaled classical washout.
+
+    Attributes:
+        gain: Its gain [-].
+        drive: What it did.
+        tried: Every gain tried with its RMSE(x, y), by gain [-, m/s2].
+    """
+
+    gain: float
+    drive: Drive
+    tried: tuple[tuple[float, float], ...]
+
+
+def find_yardstick(
+    machine: Machine,
+    recording: Recording,
+    tuning: Tuning,
+    *,
+    rate: float = RATE_HZ,
+    planner_hz: float = PLANNER_HZ,
+    jobs: int = 1,
+    tell: Told | None = None,
+) -> Yardstick:
+    """Search the gain; the result does not depend on ``jobs``.
+
+    Args:
+        machine: Geometry and hard limits.
+        recording: The drive.
+        tuning: Scale and thresholds; algorithm and gain are replaced.
+        rate: Rate of the executed samples [Hz].
+        planner_hz: Planner rate [Hz].
+        jobs: Processes that drive at the same time.
+        tell: Called with a line of progress.
+
+    Returns:
+        The yardstick.
+    """
+    run = partial(_drive, machine, recording, tuning, rate, planner_hz)
+    tried: dict[float, float] = {}
+    best: Drive | None = None
+    best_gain = 0.0
+    for step in (0.0, *STEPS):
+        asked = COARSE if step == 0.0 else (best_gain - step, best_gain + step)
+        gains = tuple(g for g in (round(a, 6) for a in asked) if 0.0 < g <= 1.0 and g not in tried)
+        for gain, driven in zip(gains, _all(run, gains, jobs), strict=True):
+            tried[gain] = rmse_xy(driven)
+            # a tie goes to the smaller gain, whatever the order of trial
+            if best is None or (tried[gain], gain) < (tried[best_gain], best_gain):
+                best, best_gain = driven, gain
+        if tell is not None and gains:
+            tell(f"yardstick: gain {best_gain:g}, RMSE(x, y) {tried[best_gain]:.4f} m/s2")
+    assert best is not None
+    return Yardstick(best_gain, replace(best, name="yardstick"), tuple(sorted(tried.items())))
+
+
+def _all(run: Callable[[float], Drive], gains: tuple[float, ...], jobs: int) -> list[Drive]:
+    if jobs <= 1 or len(gains) < 2:
+        return [run(gain) for gain in gains]
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(gains)), context) as pool:
+        return list(pool.map(run, gains))
+
+
+def _drive(
+    machine: Machine,
+    recording: Recording,
+    tuning: Tuning,
+    rate: float,
+    planner_hz: float,
+    gain: float,
+) -> Drive:
+    washout = replace(tuning, algorithm="classical", gain=gain)
+    return drive(machine, recording, washout, rate=rate, planner_hz=planner_hz)

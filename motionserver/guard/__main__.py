@@ -1,0 +1,47 @@
+"""Entry of the guard process: ``python -m motionserver.guard RUN_DIR SOCKET_FD [leave]``."""
+
+from __future__ import annotations
+
+import asyncio
+import fcntl
+import gc
+import logging
+import signal
+import sys
+from pathlib import Path
+
+from motionserver.guard.loop import GuardLoop
+from motionserver.guard.options import read_options
+from motionserver.guard.ports import open_link
+from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.realtime import take_priority
+
+
+def main() -> int:
+    """Wait for the guard's lock, then run: the second process started is a warm spare.
+
+    A spare that is told to end while it waits remembers it: it parks if its turn comes, since
+    the guard before it may have died while parking.
+    """
+    told: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
+    follow_parent()
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
+    run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
+    options = read_options(run_dir)
+    link = open_link(descriptor)
+    # before it waits: a spare that must first queue for a busy processor takes over late
+    scheduling = take_priority(50, options.realtime)
+    gc.collect()
+    gc.freeze()
+    with (run_dir / "guard.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        loop = GuardLoop(options, run_dir, link, scheduling)
+        signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
+        if told or sys.argv[3:] == ["leave"]:
+            loop.ask_to_leave("told before its turn came")
+        return asyncio.run(loop.run())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

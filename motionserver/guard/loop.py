@@ -1,0 +1,199 @@
+"""The guard's loop: timer, platform socket, mapped files around the pure `Guard`."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import signal
+import socket
+from collections import deque
+from pathlib import Path
+from typing import Any, Final
+
+from motionserver.core.safety.act import Guard
+from motionserver.core.safety.given import Request, TickInput
+from motionserver.core.safety.setpoint import Setpoint
+from motionserver.core.safety.states import RAISED, State
+from motionserver.core.safety.supervisor import is_standing
+from motionserver.guard.options import GuardOptions
+from motionserver.guard.ports import Ports
+from motionserver.guard.snapshot import snapshot
+from motionserver.telemetry.logs import Seldom
+from motionserver.telemetry.requests import RequestServer
+from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
+
+SLOWEST_TICK_HZ: Final = 240.0
+SNAPSHOT_NS: Final = 30_000_000
+SECOND: Final = 1_000_000_000
+
+log = logging.getLogger("motionserver.guard")
+
+
+class GuardLoop:
+    """One guard on one platform."""
+
+    def __init__(
+        self, options: GuardOptions, run_dir: Path, link: socket.socket, scheduling: str
+    ) -> None:
+        self.options = options
+        self.guard = Guard(options.guard)
+        self._ports = Ports(options, run_dir, link, self.guard.record.counters)
+        self._requests = RequestServer(run_dir / "guard.sock")
+        ticks = 1
+        while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
+            ticks += 1
+        self._ticks_per_send = ticks
+        self._tick_ns = SECOND / (ticks * options.rate_hz)
+        self._lateness = Lateness(int(self._tick_ns))
+        self._leave = False
+        self._seen_event = 0
+        self._last_ns = 0
+        self._tick = 0
+        self._sent_slot = -1
+        self._sends: deque[int] = deque(maxlen=120)
+        self._snapshot_ns = 0
+        self._setpoint: Setpoint | None = None
+        self._done: asyncio.Future[int] | None = None
+        self._start_ns = now_ns()
+        self.scheduling = scheduling
+        self._seldom = Seldom(log)
+
+    async def run(self) -> int:
+        """Run until told to leave and parked.
+
+        Returns:
+            Exit status: 0 if it ended parked or with the platform never raised, 3 otherwise.
+        """
+        loop = asyncio.get_running_loop()
+        self._done = loop.create_future()
+        loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        gc.freeze()
+        gc.disable()
+        ticker = Ticker(self._wake)
+        self._start_ns = now_ns()
+        self._last_ns = self._start_ns
+        self._ticker = ticker
+        ticker.arm(int(self._start_ns + self._tick_ns))
+        machine = self.guard.machine
+        log.info("guard ready, limits %s of %s; %s", machine.digest, machine.name, self.scheduling)
+        try:
+            return await self._done
+        finally:
+            ticker.close()
+
+    def ask_to_leave(self, why: str) -> None:
+        """Park and end; asking again does not hurry it."""
+        if not self._leave:
+            self.guard.record.note(now_ns(), f"leaving: {why}")
+        self._leave = True
+
+    def _wake(self) -> None:
+        now = now_ns()
+        slot = int((now - self._start_ns) / self._tick_ns)
+        self._lateness.ticked(int(now - self._start_ns - (self._tick + 1) * self._tick_ns))
+        self._tick = slot
+        try:
+            self._step(now, slot)
+        except Exception:
+            # the guard must not die of a surprise: the plan's clock pauses for this tick
+            self.guard.record.counters["tick_errors"] += 1
+            self._seldom.exception(now, "tick failed")
+        self._ticker.arm(int(self._start_ns + (slot + 1) * self._tick_ns))
+
+    def _step(self, now: int, slot: int) -> None:
+        send_slot = slot // self._ticks_per_send
+        is_due = send_slot != self._sent_slot
+        requests = self._requests.poll()
+        counters = self.guard.record.counters
+        counters["request_malformed"] = self._requests.malformed
+        given = TickInput(
+            now_ns=now,
+            gap=(now - self._last_ns) / SECOND,
+            is_due=is_due,
+            feedback=self._ports.feedback(),
+            cue=self._ports.cue(),
+            proposal=self._ports.proposal(),
+            requests=tuple(
+                as_request(message, self.options.enable_input) for message, _ in requests
+            ),
+            leave=self._leave,
+        )
+        if given.gap > 1.5e-9 * self._tick_ns:
+            counters["late_ticks"] += 1
+        self._last_ns = now
+        setpoint, answers = self.guard.tick(given)
+        if setpoint is not None:
+            if self._sent_slot >= 0:
+                counters["missed_slots"] += send_slot - self._sent_slot - 1
+            self._sent_slot = send_slot
+            self._sends.append(now)
+        # the planner must know of an acceptance at once, or it continues the wrong parent
+        if setpoint is not None or self._ports.has_news(self.guard.record):
+            due = self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns
+            self._ports.publish(
+                self._sends[-1] if self._sends else now, now, int(due), self.guard.record
+            )
+        if setpoint is not None:
+            self._ports.send(setpoint)
+            self._setpoint = setpoint
+        record = self.guard.record
+        for (_, address), refusal in zip(requests, answers, strict=True):
+            answer = {"ok": not refusal, "state": record.state, "reason": refusal or record.reason}
+            self._requests.answer(address, answer)
+        self._log_events()
+        if record.state is State.PARKED and slot % 4096 == 0:
+            gc.collect()
+        self._maybe_end(now)
+        is_last = self._done is not None and self._done.done()
+        if is_last or now - self._snapshot_ns > SNAPSHOT_NS:
+            self._snapshot_ns = now
+            self._show(now)
+
+    def _show(self, now: int) -> None:
+        if self._setpoint is not None:
+            ticks = {**self._lateness.summary(), "scheduling": self.scheduling}
+            self._ports.show(
+                snapshot(self.guard, self.options, self._setpoint, ticks, self._rates(), now)
+            )
+
+    def _rates(self) -> dict[str, float]:
+        sends = self._sends
+        span = (sends[-1] - sends[0]) / SECOND if len(sends) > 1 else 0.0
+        return {
+            "tick": round(SECOND / self._tick_ns, 3),
+            "send": round((len(sends) - 1) / span, 3) if span else 0.0,
+        }
+
+    def _log_events(self) -> None:
+        record = self.guard.record
+        for when, text in record.events:
+            if when > self._seen_event:
+                log.info("%s", text)
+        if record.events:
+            self._seen_event = record.events[-1][0]
+
+    def _maybe_end(self, now: int) -> None:
+        """Leave once nothing moves: parked, never raised, or standing in a fault."""
+        record = self.guard.record
+        if not self._leave or self._done is None or self._done.done():
+            return
+        offline = record.state is State.OFFLINE and now - self._start_ns > SECOND
+        if record.state is State.PARKED or offline:
+            self._done.set_result(0)
+        elif record.state not in RAISED | {State.OFFLINE} and is_standing(record.playback):
+            self._done.set_result(3)
+
+
+def as_request(message: dict[str, Any], enable_input: Path | None) -> Request:
+    """An edge; a word that is none is not kept, so that nobody can fill the counters with words."""
+    op = message["op"] if message["op"] in ("engage", "park", "reset") else "unknown"
+    enabled = True
+    if op == "engage" and enable_input is not None:
+        try:
+            with enable_input.open("rb") as file:
+                enabled = file.read(16).strip() == b"1"
+        except OSError:
+            enabled = False
+    return Request(op, str(message.get("by", "console"))[:20], enabled)

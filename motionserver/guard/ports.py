@@ -1,0 +1,135 @@
+"""What the guard reads and writes: the platform's socket and the mapped files."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import struct
+from collections import Counter
+from pathlib import Path
+from typing import Final
+
+from motionserver.core.device import Feedback
+from motionserver.core.plan import Plan, pack, unpack
+from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.setpoint import Setpoint
+from motionserver.core.safety.watchdog import CueStatus
+from motionserver.guard.options import GuardOptions
+from motionserver.platforms.base import PlatformPacketError
+from motionserver.platforms.registry import make_platform
+from motionserver.telemetry.link import STATES, GuardClock, Maps, unpack_cue
+from motionserver.telemetry.ticker import now_ns
+
+DRAIN: Final = 64
+
+
+class Ports:
+    """All that comes in and goes out of the guard, but for requests."""
+
+    def __init__(
+        self, options: GuardOptions, run_dir: Path, link: socket.socket, counters: Counter[str]
+    ) -> None:
+        self._format = make_platform(options.format, options.options)
+        self._peer = options.peer
+        self._link = link
+        self._counters = counters
+        self._maps = Maps(run_dir)
+        self._seen_proposal = self._maps.proposal.newest_sequence()
+        self._seen_cue = 0
+        self._accepted_id = 0
+
+    def feedback(self) -> tuple[Feedback, ...]:
+        """Answers of the device that wait, at most `DRAIN`; everything else is counted."""
+        out: list[Feedback] = []
+        counters = self._counters
+        for _ in range(DRAIN):
+            try:
+                data, peer = self._link.recvfrom(2048)
+            except (BlockingIOError, ConnectionError):
+                break
+            if peer[0] != self._peer[0] or peer[1] != self._peer[1]:
+                counters["feedback_foreign"] += 1
+                continue
+            try:
+                out.append(self._format.decode(data, now_ns()))
+                counters["feedback"] += 1
+            except PlatformPacketError as error:
+                counters[error.reason] += 1
+        return tuple(out)
+
+    def cue(self) -> CueStatus | None:
+        """The planner's newest word about the source, if it is new."""
+        if self._maps.cue.newest_sequence() == self._seen_cue:
+            return None
+        message = self._maps.cue.read()
+        if message is None:
+            return None
+        self._seen_cue = message[0]
+        try:
+            return unpack_cue(message[1])
+        except (ValueError, struct.error):
+            self._counters["cue_malformed"] += 1
+            return None
+
+    def proposal(self) -> Plan | None:
+        """The planner's newest proposal, if it is new."""
+        if self._maps.proposal.newest_sequence() == self._seen_proposal:
+            return None
+        message = self._maps.proposal.read()
+        if message is None:
+            return None
+        self._seen_proposal = message[0]
+        try:
+            return unpack(message[1])
+        except ValueError:
+            self._counters["rejected_malformed"] += 1
+            self._counters["plans_rejected"] += 1
+            return None
+
+    def has_news(self, record: GuardRecord) -> bool:
+        """True if a plan was accepted that the planner does not know of yet."""
+        playback = record.playback
+        return playback is not None and playback.newest.plan.plan_id != self._accepted_id
+
+    def publish(self, sent: int, now: int, due: int, record: GuardRecord) -> None:
+        """Tell the planner what is accepted, before the packet goes out."""
+        playback = record.playback
+        newest = None if playback is None else playback.newest.plan
+        if newest is not None and newest.plan_id != self._accepted_id:
+            self._maps.accepted.write(pack(newest))
+            self._accepted_id = newest.plan_id
+        self._maps.clock.write(
+            GuardClock(
+                STATES.index(record.state),
+                0 if newest is None else newest.plan_id,
+                0.0 if playback is None else playback.newest_clock,
+                sent,
+                due,
+                now,
+            ).pack()
+        )
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send a setpoint to the platform; what the network refuses is counted."""
+        try:
+            self._link.sendto(self._format.encode(setpoint), self._peer)
+            self._counters["packets_sent"] += 1
+        except OSError:
+            self._counters["send_errors"] += 1
+
+    def show(self, snapshot: bytes) -> None:
+        """Publish the snapshot for the page; one that is too long is counted."""
+        try:
+            self._maps.guard.write(snapshot)
+        except ValueError:
+            self._counters["snapshots_too_long"] += 1
+
+
+def open_link(descriptor: int) -> socket.socket:
+    """The platform's socket, inherited from the supervisor."""
+    link = socket.socket(fileno=os.dup(descriptor))
+    link.setblocking(False)
+    with contextlib.suppress(OSError):
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 16384)
+    return link

@@ -1,0 +1,154 @@
+"""All inputs of the planner: sockets drained, packets decoded, believed or counted."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from motionserver.core.intake.gate import Gate
+from motionserver.core.state import VehicleMotion
+from motionserver.planner.options import InputOptions
+from motionserver.sources.base import SourceError, SourceFormat
+from motionserver.sources.registry import make_source
+from motionserver.sources.udp import UdpInput
+from motionserver.sources.zenoh_input import ZenohInput
+
+log = logging.getLogger("motionserver.planner")
+SHOWN_ERRORS = 5
+MOST_SENDERS = 8
+"""Senders per input whose format is remembered; more are strangers, and start anew."""
+
+
+class Transport(Protocol):
+    """Where datagrams come from."""
+
+    def drain(self) -> list[tuple[bytes, str, int]]:
+        """Datagrams that wait: bytes, sender, arrival [ns]."""
+        ...
+
+    def reply(self, name: str, data: bytes) -> None:
+        """Send to a sender."""
+        ...
+
+    def close(self) -> None:
+        """Stop."""
+        ...
+
+
+@dataclass(slots=True)
+class Input:
+    """One source: transport, a decoder for each sender, name."""
+
+    options: InputOptions
+    transport: Transport
+    formats: dict[str, SourceFormat] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """How it is shown."""
+        return f"{self.options.kind} {self.options.host}:{self.options.port}"
+
+    def decode(self, data: bytes, address: str, arrival_ns: int) -> VehicleMotion:
+        """Read a datagram; what a format remembers of a sender, another sender cannot touch.
+
+        Raises:
+            SourceError: The bytes are no sample.
+        """
+        if address not in self.formats:
+            while len(self.formats) >= MOST_SENDERS:
+                del self.formats[next(iter(self.formats))]
+            self.formats[address] = make_source(self.options.kind, self.options.key)
+        return self.formats[address].decode(data, arrival_ns)
+
+
+def open_input(options: InputOptions) -> Input:
+    """Open one input.
+
+    Raises:
+        OSError: The address cannot be bound.
+        ConfigError: The kind is unknown.
+    """
+    make_source(options.kind, options.key)
+    transport: Transport
+    if options.kind == "zenoh":
+        endpoint = f"tcp/{options.host}:{options.port}"
+        transport = ZenohInput(options.topic, [endpoint], list(options.connect))
+    else:
+        transport = UdpInput(options.host, options.port)
+    return Input(options, transport)
+
+
+class Inputs:
+    """The vehicle's sources, with one owner, and the platform's own sensor, with another."""
+
+    def __init__(self, inputs: list[Input], may_change_owner: Callable[[], bool]) -> None:
+        self.inputs = inputs
+        self.vehicle = Gate(may_change_owner)
+        self.sensor = Gate()
+        self.counters: Counter[str] = Counter()
+        self.owner_input: Input | None = None
+        self.last_error = ""
+
+    def poll(self) -> tuple[list[VehicleMotion], list[VehicleMotion]]:
+        """Read what waits.
+
+        Returns:
+            Believed samples of the vehicle and of the platform's sensor, oldest first.
+        """
+        vehicle: list[VehicleMotion] = []
+        sensor: list[VehicleMotion] = []
+        for source in self.inputs:
+            for data, address, arrival_ns in source.transport.drain():
+                self.counters["packets"] += 1
+                try:
+                    motion = source.decode(data, address, arrival_ns)
+                except SourceError as error:
+                    self._refused(error.reason, f"{source.name} from {address}: {error}")
+                    continue
+                except Exception as error:
+                    # a third party's format that stumbles costs its packet, not the period
+                    self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")
+                    continue
+                wants_sensor = source.options.kind == "imu"
+                if wants_sensor and not motion.at_platform:
+                    self._refused("not_measured", f"{address}: not flagged as measured")
+                    continue
+                gate = self.sensor if motion.at_platform else self.vehicle
+                refusal = gate.refuse(source.name, address, motion)
+                if refusal is not None:
+                    self._refused(refusal, f"{source.name} from {address}: {refusal}")
+                elif motion.at_platform:
+                    sensor.append(motion)
+                else:
+                    vehicle.append(motion)
+                    self.owner_input = source
+        self.counters["accepted"] += len(vehicle)
+        self.counters["accepted_sensor"] += len(sensor)
+        return vehicle, sensor
+
+    def _refused(self, reason: str, text: str) -> None:
+        key = f"refused_{reason.replace('-', '_')}"
+        self.counters[key] += 1
+        self.counters["refused"] += 1
+        self.last_error = text
+        if self.counters[key] <= SHOWN_ERRORS:
+            log.warning("packet refused, %s", text)
+
+    @property
+    def owner_key(self) -> bytes | None:
+        """Key that the owner signs with, and what it is told is signed with; None without."""
+        return None if self.owner_input is None else self.owner_input.options.key
+
+    def reply(self, data: bytes) -> None:
+        """Send a status to the owner, if its input can answer."""
+        owner = self.vehicle.owner
+        if owner is not None and self.owner_input is not None:
+            self.owner_input.transport.reply(owner.address, data)
+
+    def close(self) -> None:
+        """Close all."""
+        for source in self.inputs:
+            source.transport.close()

@@ -1,0 +1,215 @@
+"""The planner's loop: wake before a send slot, read inputs, think, propose, show."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+import signal
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from motion_protocol import PlatformState as WireState
+from motion_protocol import Status, encode_status
+
+from motionserver.core.axes import GRAVITY, Array, frozen
+from motionserver.core.intake.intake import Head, Intake
+from motionserver.core.kinematics.rotation import felt
+from motionserver.core.plan import pack
+from motionserver.core.safety.states import CUED, State
+from motionserver.core.safety.watchdog import CueStatus
+from motionserver.core.state import STILL, Stimulus, VehicleMotion
+from motionserver.cueing.measured import MeasuredForce
+from motionserver.cueing.think import Thinker, Thought
+from motionserver.planner.handover import Handover, HandoverClock
+from motionserver.planner.inputs import Inputs, open_input
+from motionserver.planner.options import PlannerOptions
+from motionserver.planner.show import PlannerView, Timing
+from motionserver.planner.tuner import Tuner
+from motionserver.telemetry.link import STATES, Maps, pack_cue
+from motionserver.telemetry.logs import Seldom
+from motionserver.telemetry.realtime import take_priority
+from motionserver.telemetry.requests import RequestServer
+from motionserver.telemetry.ticker import Ticker, now_ns
+
+SECOND: Final = 1_000_000_000
+STATUS_NS: Final = 100_000_000
+SNAPSHOT_NS: Final = 30_000_000
+UP: Final = frozen([0.0, 0.0, GRAVITY])
+
+log = logging.getLogger("motionserver.planner")
+
+
+class PlannerLoop:
+    """One planner for one guard."""
+
+    def __init__(self, options: PlannerOptions, run_dir: Path) -> None:
+        self.options = options
+        self._maps = Maps(run_dir)
+        self._requests = RequestServer(run_dir / "planner.sock")
+        self._tuner = Tuner(options)
+        homes = frozen(np.stack((np.zeros(6), options.machine.parked_pose)))
+        self._thinker = Thinker(options.machine, self._tuner.tuning(), options.period, homes)
+        self._clock = HandoverClock(self._maps, options.send_period)
+        self._state: State | None = None
+        self._inputs = Inputs(
+            [open_input(one) for one in options.inputs], lambda: self._state is not State.RUN
+        )
+        self._intake = Intake()
+        self._measured = MeasuredForce()
+        self._measured_ns = 0
+        self._timing = Timing(int(options.period * SECOND))
+        self._view = PlannerView()
+        self._seldom = Seldom(log)
+        self._status_ns = 0
+        self._snapshot_ns = 0
+        self._ticker: Ticker | None = None
+        self._due_ns = 0
+
+    async def run(self) -> int:
+        """Run until terminated."""
+        loop = asyncio.get_running_loop()
+        self._done: asyncio.Future[int] = loop.create_future()
+        loop.add_signal_handler(signal.SIGTERM, self._finish)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        self.scheduling = take_priority(30, self.options.realtime)
+        self._ticker = Ticker(self._wake)
+        self._arm(now_ns())
+        log.info("planner ready: %s", self._thinker.tuning.algorithm)
+        try:
+            return await self._done
+        finally:
+            self._ticker.close()
+            self._inputs.close()
+            self._requests.close()
+
+    def _finish(self) -> None:
+        if not self._done.done():
+            self._done.set_result(0)
+
+    def _wake(self) -> None:
+        woken = now_ns()
+        self._timing.woke(woken - self._due_ns)
+        try:
+            self._step(woken)
+        except Exception:
+            self._inputs.counters["tick_errors"] += 1
+            self._seldom.exception(woken, "period failed; the accepted plan plays on")
+        self._arm(now_ns())
+
+    def _arm(self, now: int) -> None:
+        """Wake one budget ahead of a send slot; at the plain period while no guard is heard."""
+        period = int(self.options.period * SECOND)
+        clock = self._clock.clock
+        if clock is None:
+            wake = max(self._due_ns + period, now)
+        else:
+            wake = clock.due_ns - int(self.options.budget * SECOND)
+            earliest = max(now + 500_000, self._due_ns + period // 2)
+            wake += max(0, -(-(earliest - wake) // period)) * period
+        self._due_ns = wake
+        if self._ticker is not None:
+            self._ticker.arm(wake)
+
+    def _step(self, now: int) -> None:
+        vehicle, sensor = self._inputs.poll()
+        for motion in vehicle:
+            self._intake.offer(motion)
+        self._state = self._clock.read(now)
+        fresh = self._inputs.vehicle.freshness
+        stale_after = fresh.stale_after_ns()
+        status = CueStatus(fresh.newest_ns or 0, stale_after, self._inputs.vehicle.mode)
+        self._maps.cue.write(pack_cue(status, now))
+        tuning = self._thinker.tuning
+        wanted = self._state is State.RUN and not fresh.is_stale(now)
+        head = Head(self.options.arm, tuning.scale)
+        stimulus = self._intake.stimulus(head, self.options.period, wanted)
+        if self._state not in CUED:
+            stimulus = STILL
+            self._intake.gain = 0.0
+        handover = self._clock.handover(now, self._timing.expected_ns)
+        if handover is not None:
+            self._think(now, handover, stimulus, sensor)
+        self._serve()
+        self._status(now)
+        if now - self._snapshot_ns > SNAPSHOT_NS:
+            self._snapshot_ns = now
+            self._maps.planner.write(
+                self._view.snapshot(
+                    now, self._thinker, self._inputs, self._timing, self._tuner, self._measured
+                )
+            )
+
+    def _think(
+        self, now: int, handover: Handover, stimulus: Stimulus, sensor: list[VehicleMotion]
+    ) -> None:
+        parent = handover.parent
+        model = self._felt(handover)
+        self._compare(now, sensor, model)
+        self._thinker.cueing.disturbance = self._measured.disturbance
+        thought: Thought = self._thinker.think(
+            parent, handover.before, handover.takeover, stimulus, now
+        )
+        if thought.proposal is not None:
+            self._maps.proposal.write(pack(thought.proposal.plan))
+            self._clock.proposed(thought.proposal.plan)
+        self._timing.thought(now_ns() - now)
+        self._view.note(thought, stimulus, model - UP)
+
+    def _felt(self, handover: Handover) -> Array:
+        """What the person feels about now, gravity included, (3,) [m/s2]."""
+        state = handover.parent.state(handover.takeover)
+        force, _ = felt(state.pose, state.velocity, state.acceleration, self.options.machine.head)
+        return force
+
+    def _compare(self, now: int, sensor: list[VehicleMotion], model: Array) -> None:
+        if sensor:
+            mean = np.mean([motion.force for motion in sensor], axis=0)
+            elapsed = min(0.1, (now - self._measured_ns) / SECOND)
+            self._measured.update(mean, model, elapsed)
+            self._measured_ns = now
+        elif now - self._measured_ns > SECOND // 5:
+            self._measured.lost()
+
+    def _serve(self) -> None:
+        for message, address in self._requests.poll():
+            answer, tuning = self._tuner.serve(message)
+            if tuning is not None:
+                self._thinker.retune(tuning)
+            self._requests.answer(address, answer)
+
+    def _status(self, now: int) -> None:
+        """Answer the owner ten times a second, with its own time echoed."""
+        gate, counters = self._inputs.vehicle, self._inputs.counters
+        echo = self._intake.newest
+        if now - self._status_ns < STATUS_NS or echo is None or echo.sender_ns is None:
+            return
+        if gate.freshness.is_stale(now) or gate.owner is None:
+            return
+        self._status_ns = now
+        state = State.OFFLINE if self._state is None else self._state
+        self._inputs.reply(
+            encode_status(
+                Status(
+                    session=gate.owner.session,
+                    sequence=counters["status_sent"] & 0xFFFFFFFF,
+                    sim_time_ns=0,
+                    send_time_ns=now_ns(),
+                    echo_sender_time_ns=echo.sender_ns,
+                    receive_time_ns=echo.arrival_ns,
+                    echo_sequence=echo.sequence or 0,
+                    accepted_sequence=echo.sequence or 0,
+                    lost=gate.lost & 0xFFFFFFFF,
+                    reordered=counters["refused_reordered"] & 0xFFFFFFFF,
+                    rejected=counters["refused"] & 0xFFFFFFFF,
+                    scale=self._intake.gain * self._thinker.tuning.scale,
+                    state=WireState(STATES.index(state)),
+                ),
+                self._inputs.owner_key,
+            )
+        )
+        counters["status_sent"] += 1

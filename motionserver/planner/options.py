@@ -1,0 +1,87 @@
+"""What the supervisor tells the planner, as plain JSON, already in SI and validated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.limits import Machine, machine_from_mapping
+
+
+@dataclass(frozen=True, slots=True)
+class InputOptions:
+    """One of ``[[sources]]``.
+
+    Attributes:
+        kind: Name of the format.
+        host: Address to listen on.
+        port: Port to listen on.
+        key: Key of signed packets, if any.
+        topic: Zenoh key, for kind zenoh.
+        connect: Zenoh endpoints to connect to, for kind zenoh.
+    """
+
+    kind: str
+    host: str
+    port: int
+    key: bytes | None
+    topic: str
+    connect: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerOptions:
+    """Everything the planner process needs.
+
+    Attributes:
+        machine: Geometry and hard limits.
+        period: Planner period [s].
+        send_period: Period of the platform's packets [s].
+        budget: How long before a send slot it wakes [s].
+        arm: Driver's head from the point whose motion is sent, (3,) [m].
+        inputs: The sources.
+        tuning: Tunables at the start, in the units of the page.
+        tuning_file: Where the tuning in force survives a restart of the planner.
+        realtime: True: ask for real-time scheduling.
+    """
+
+    machine: Machine
+    period: float
+    send_period: float
+    budget: float
+    arm: Array
+    inputs: tuple[InputOptions, ...]
+    tuning: dict[str, Any]
+    tuning_file: Path
+    realtime: bool
+
+
+def read_options(run_dir: Path) -> PlannerOptions:
+    """Read ``config.json`` of a run directory."""
+    data: dict[str, Any] = json.loads((run_dir / "config.json").read_text("utf-8"))
+    planner = data["planner"]
+    inputs = tuple(
+        InputOptions(
+            kind=source["kind"],
+            host=source["host"],
+            port=source["port"],
+            key=bytes.fromhex(source["key"]) or None,
+            topic=source["topic"],
+            connect=tuple(source["connect"]),
+        )
+        for source in data["sources"]
+    )
+    return PlannerOptions(
+        machine=machine_from_mapping(data["machine"]),
+        period=planner["period"],
+        send_period=1.0 / data["platform"]["rate_hz"],
+        budget=planner["budget"],
+        arm=frozen(planner["arm"]),
+        inputs=inputs,
+        tuning=planner["tuning"],
+        tuning_file=run_dir / "tuning.json",
+        realtime=data["realtime"],
+    )

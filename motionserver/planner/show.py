@@ -1,0 +1,141 @@
+"""What the planner shows: timing, forces, source, solver, as one JSON object."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter, deque
+from typing import Any, Final
+
+import numpy as np
+
+from motionserver.core.axes import GRAVITY, Array
+from motionserver.core.state import STILL, Stimulus
+from motionserver.cueing.measured import MeasuredForce
+from motionserver.cueing.think import Thinker, Thought
+from motionserver.planner.inputs import Inputs
+from motionserver.planner.tuner import Tuner
+from motionserver.telemetry.ticker import Lateness
+
+GUESS_NS: Final = 5_000_000
+
+
+class Timing:
+    """How late it wakes and how long it thinks."""
+
+    def __init__(self, period_ns: int) -> None:
+        self.lateness = Lateness(period_ns)
+        self._thoughts: deque[int] = deque(maxlen=1024)
+        self._wakes: deque[int] = deque(maxlen=64)
+
+    def woke(self, late_ns: int) -> None:
+        """Note a wake-up."""
+        self.lateness.ticked(max(0, late_ns))
+
+    def thought(self, took_ns: int) -> None:
+        """Note how long a plan took, from waking to proposing."""
+        self._thoughts.append(took_ns)
+
+    @property
+    def expected_ns(self) -> int:
+        """How long the next plan will take, on the careful side [ns]."""
+        recent = sorted(list(self._thoughts)[-100:])
+        return recent[int(0.95 * (len(recent) - 1))] if recent else GUESS_NS
+
+    def summary(self) -> dict[str, float]:
+        """Percentiles of plan times [ms]."""
+        times = sorted(self._thoughts) or [0]
+        last = self._thoughts[-1] if self._thoughts else 0
+        return {
+            "time_p50_ms": times[len(times) // 2] / 1e6,
+            "time_p99_ms": times[int(0.99 * (len(times) - 1))] / 1e6,
+            "last_ms": last / 1e6,
+        }
+
+
+def _numbers(values: Array) -> list[float]:
+    return [round(float(value), 5) for value in values]
+
+
+class PlannerView:
+    """Remembers the last thought and writes the snapshot."""
+
+    def __init__(self) -> None:
+        self._thought: Thought | None = None
+        self._stimulus: Stimulus = STILL
+        self._felt: Array = np.zeros(3)
+        self._counters: Counter[str] = Counter()
+        self._last_count = (0, 0)
+        self._rate = 0.0
+
+    def note(self, thought: Thought, stimulus: Stimulus, felt_force: Array) -> None:
+        """Take the last period's outcome."""
+        self._thought, self._stimulus, self._felt = thought, stimulus, felt_force
+        self._counters["plans_thought"] += 1
+        if thought.proposal is None:
+            self._counters["no_plan"] += 1
+        elif thought.proposal.kappa == 0.0:
+            self._counters["plans_refused"] += 1
+        elif thought.proposal.kappa < 1.0:
+            self._counters["plans_halved"] += 1
+
+    def snapshot(
+        self,
+        now_ns: int,
+        thinker: Thinker,
+        inputs: Inputs,
+        timing: Timing,
+        tuner: Tuner,
+        measured: MeasuredForce,
+    ) -> bytes:
+        """Write everything as JSON."""
+        thought, gate = self._thought, inputs.vehicle
+        age = gate.freshness.age_ns(now_ns)
+        proposal = None if thought is None else thought.proposal
+        report = None if thought is None else thought.report
+        x_max = thinker.tuning.box if report is None else report.x_max
+        measured_force = None
+        if measured.latest is not None:
+            measured_force = _numbers(measured.latest - np.array([0.0, 0.0, GRAVITY]))
+        ticks = timing.lateness.ticks
+        if now_ns - self._last_count[0] > 500_000_000:
+            elapsed = (now_ns - self._last_count[0]) / 1e9
+            self._rate = (ticks - self._last_count[1]) / elapsed if self._last_count[0] else 0.0
+            self._last_count = (now_ns, ticks)
+        shown: dict[str, Any] = {
+            "pid": os.getpid(),
+            "t_ns": now_ns,
+            "algorithm": thinker.tuning.algorithm,
+            "x_max": _numbers(x_max),
+            "wanted_force": _numbers(self._stimulus.force),
+            "wanted_rates": _numbers(self._stimulus.rates),
+            "felt_force": _numbers(self._felt),
+            "measured_force": measured_force,
+            "disturbance": _numbers(measured.disturbance),
+            "tracking": {"mismatch": round(measured.mismatch, 4), "alarm": measured.alarm},
+            "gain": round(self._stimulus.gain, 4),
+            "source": {
+                "kind": None if inputs.owner_input is None else inputs.owner_input.options.kind,
+                "address": None if gate.owner is None else gate.owner.address,
+                "session": None if gate.owner is None else gate.owner.session,
+                "age_s": None if age is None else round(age / 1e9, 4),
+                "rate_hz": round(gate.freshness.rate_hz(), 2),
+                "mode": gate.mode.name.lower(),
+                "fresh": not gate.freshness.is_stale(now_ns),
+                "last_error": inputs.last_error[:300],
+            },
+            "solver": {
+                "backend": thinker.tuning.backend,
+                "iterations": 0 if report is None else report.iterations,
+                "status": "none" if report is None else report.solver_status,
+                **timing.summary(),
+            },
+            "kappa": None if proposal is None else proposal.kappa,
+            "trouble": "" if thought is None else thought.trouble[:300],
+            "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],
+            "counters": {**inputs.counters, **self._counters, "lost_packets": gate.lost},
+            "tuning": tuner.shown(),
+            "tick": timing.lateness.summary(),
+            "rates_hz": {"planner": round(self._rate, 2)},
+        }
+        return json.dumps(shown).encode()

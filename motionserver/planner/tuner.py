@@ -1,0 +1,63 @@
+"""The planner owns the tuning: it serves the page's requests and keeps what is in force."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from typing import Any
+
+from motionserver.cueing.tuning import Tuning
+from motionserver.planner.options import PlannerOptions
+from motionserver.settings.fields import TuningError
+from motionserver.settings.tuning import apply_changes, default_for
+from motionserver.settings.tuning_book import TuningBook
+
+log = logging.getLogger("motionserver.planner")
+
+
+class Tuner:
+    """The book of tunings, kept in the run directory over a restart of this process."""
+
+    def __init__(self, options: PlannerOptions) -> None:
+        self._file = options.tuning_file
+        machine = options.machine
+        self._book = TuningBook(
+            machine, time.monotonic, apply_changes(default_for(machine), options.tuning)
+        )
+        try:
+            kept = json.loads(self._file.read_text("utf-8"))
+            self._book = TuningBook.from_mapping(kept, machine, time.monotonic)
+        except FileNotFoundError:
+            pass
+        except (OSError, ValueError, TuningError) as error:
+            log.warning("the kept tuning is not used: %s", error)
+
+    def tuning(self) -> Tuning:
+        """The tuning in force, SI."""
+        return self._book.tuning
+
+    def shown(self) -> dict[str, Any]:
+        """Version and values, for the page."""
+        return {"version": self._book.version, "values": self._book.model.model_dump()}
+
+    def serve(self, message: dict[str, Any]) -> tuple[dict[str, Any], Tuning | None]:
+        """Answer a request.
+
+        Returns:
+            The answer, and the new tuning if it changed.
+        """
+        before = self._book.version
+        answer = self._book.answer(message)
+        if self._book.version == before:
+            return answer, None
+        self._keep()
+        return answer, self._book.tuning
+
+    def _keep(self) -> None:
+        try:
+            temporary = self._file.with_suffix(".new")
+            temporary.write_text(json.dumps(self._book.to_mapping()), "utf-8")
+            temporary.replace(self._file)
+        except OSError as error:
+            log.warning("the tuning is in force but cannot be kept: %s", error)

@@ -1,0 +1,1 @@
+"""Settings: the only place that reads TOML and turns other units into SI."""

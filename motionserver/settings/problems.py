@@ -1,0 +1,84 @@
+"""From a validation error to words: file, line, key, what is allowed, what to do."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+
+from pydantic import BaseModel, ValidationError
+
+from motionserver.errors import ConfigError
+
+
+def config_error(
+    error: ValidationError, path: Path | None, text: str, model: type[BaseModel]
+) -> ConfigError:
+    """Word the most telling problem of a validation error.
+
+    Args:
+        error: What pydantic found.
+        path: The file, if the values came from one.
+        text: Its content, to find the line.
+        model: The model, to suggest a key that exists.
+
+    Returns:
+        The error to raise.
+    """
+    # a mistyped key is missing as well: say what was typed
+    first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
+    keys = [str(part) for part in first["loc"]]
+    where = f"{path}{_line(text, keys)}: " if path is not None else ""
+    where += ".".join(keys) or "the whole file"
+    more = len(error.errors()) - 1
+    tail = f" ({more} more after this one)" if more else ""
+    if first["type"] == "extra_forbidden":
+        known = _known(model, keys[:-1])
+        close = difflib.get_close_matches(keys[-1], known, 1)
+        hint = f"Did you mean {close[0]!r}?" if close else f"Allowed: {', '.join(known)}."
+        return ConfigError(where, f"unknown key {keys[-1]!r}", hint + tail)
+    found = first.get("input")
+    shown = "" if isinstance(found, dict | list) else f", found {found!r}"
+    return ConfigError(where, f"{first['msg']}{shown}", f"Correct this value.{tail}")
+
+
+def _line(text: str, keys: list[str]) -> str:
+    """Line of the key, searched inside its own section; of the section if the key is missing."""
+    lines = text.splitlines()
+    names = [key for key in keys if not key.isdigit()]
+    index = next((int(key) for key in keys if key.isdigit()), 0)
+    found, begin = 0, 0
+    for depth in range(len(names), 0, -1):
+        section = r"\s*\.\s*".join(re.escape(name) for name in names[:depth])
+        headers = [
+            number
+            for number, line in enumerate(lines, 1)
+            if re.match(rf"\s*\[+\s*{section}\s*\]+", line)
+        ]
+        if headers:
+            begin = found = headers[min(index, len(headers) - 1)]
+            names = names[depth:]
+            break
+    for number, line in enumerate(lines[begin:], begin + 1):
+        if re.match(r"\s*\[+[\w\s.\"']+\]+\s*(#.*)?$", line):
+            break
+        if names and re.match(rf"\s*({re.escape(names[0])}\b)\s*[.=]", line):
+            found = number
+            break
+    return f":{found}" if found else ""
+
+
+def _known(model: type[BaseModel], keys: list[str]) -> list[str]:
+    current: object = model
+    for key in keys:
+        if key.isdigit():
+            continue
+        if isinstance(current, type) and issubclass(current, BaseModel):
+            field = current.model_fields.get(key)
+            current = None if field is None else field.annotation
+            inner = getattr(current, "__args__", None)
+            if inner:
+                current = inner[0]
+    if isinstance(current, type) and issubclass(current, BaseModel):
+        return sorted(current.model_fields)
+    return []

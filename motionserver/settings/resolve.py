@@ -1,0 +1,155 @@
+"""From the configuration to what each process is told: plain JSON, SI, validated once."""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import asdict
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+from motionserver.core.axes import frozen
+from motionserver.core.limits import machine_to_mapping
+from motionserver.cueing.registry import algorithms
+from motionserver.errors import ConfigError
+from motionserver.platforms.base import PlatformOptions
+from motionserver.platforms.registry import make_platform
+from motionserver.settings.config import Config, SourceSection, split_address, state_dir_of
+from motionserver.settings.fields import TuningError
+from motionserver.settings.machine import load_machine, unchecked_limits
+from motionserver.settings.tuning import apply_changes, default_for
+
+SHORTEST_KEY = 16
+
+
+def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, Any]:
+    """Check everything that can be checked without a socket.
+
+    Args:
+        config: The configuration.
+        run_dir: Where the processes meet.
+        dry_run: True: send nothing that moves.
+
+    Returns:
+        The content of ``config.json``; the part under "web" is the page's own file.
+
+    Raises:
+        ConfigError: Something contradicts something, or a named thing does not exist.
+    """
+    platform, cueing = config.platform, config.cueing
+    machine = load_machine(platform.preset)
+    if platform.head_m is not None:
+        machine = machine.with_head(frozen(platform.head_m))
+    offset = platform.length_offset_m
+    options = PlatformOptions(
+        mode=platform.mode,
+        length_offset=machine.leg_min if offset is None else offset,
+        leg_order=platform.leg_order,
+        heave_neutral=platform.heave_neutral_m,
+        engage_word=platform.engage_word,
+    )
+    make_platform(platform.format, options)
+    if cueing.algorithm not in algorithms():
+        raise ConfigError(
+            "[cueing] algorithm",
+            f"unknown {cueing.algorithm!r}",
+            f"Allowed: {', '.join(algorithms())}.",
+        )
+    tuning = {**cueing.tuning, "algorithm": cueing.algorithm, "scale": cueing.scale}
+    try:
+        apply_changes(default_for(machine), tuning).check_machine(machine)
+    except TuningError as error:
+        raise ConfigError("[cueing.tuning]", str(error), "Correct this value.") from error
+    per_plan = ceil(platform.rate_hz / cueing.rate_max_hz)
+    return {
+        "machine": machine_to_mapping(machine),
+        "unchecked": unchecked_limits(machine),
+        "engage": config.operator.engage,
+        "dry_run": dry_run,
+        "enable_input": config.operator.enable_input,
+        "realtime": config.server.realtime,
+        "platform": {
+            "format": platform.format,
+            "options": asdict(options),
+            "host": str(_address(platform.host)),
+            "port": platform.port,
+            "rate_hz": platform.rate_hz,
+        },
+        "planner": {
+            "period": per_plan / platform.rate_hz,
+            "budget": min(cueing.budget_ms * 1e-3, 0.8 * per_plan / platform.rate_hz),
+            "arm": list(cueing.vehicle_head_m),
+            "tuning": tuning,
+        },
+        "sources": [_source(one) for one in config.sources],
+        "web": _web(config, run_dir, machine_to_mapping(machine)),
+    }
+
+
+def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
+    try:
+        return ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
+    except ValueError as error:
+        raise ConfigError(
+            "[platform] host", f"{host!r} is no IP address", "Give the platform's number."
+        ) from error
+
+
+def _source(source: SourceSection) -> dict[str, Any]:
+    where = f"[[sources]] {source.kind} {source.listen}"
+    host, port = split_address(source.listen)
+    key = b""
+    if source.key_file:
+        try:
+            key = Path(source.key_file).expanduser().read_bytes()
+        except OSError as error:
+            raise ConfigError(
+                f"{where}: key_file", f"cannot be read ({error.strerror})", "Give a readable file."
+            ) from error
+        if len(key) < SHORTEST_KEY:
+            raise ConfigError(
+                f"{where}: key_file",
+                f"{len(key)} bytes",
+                f"Give at least {SHORTEST_KEY} random bytes, for example from /dev/urandom.",
+            )
+    if not _is_loopback(host) and not key and not source.allow_unsigned:
+        raise ConfigError(
+            f"{where}: listen",
+            "other computers could move the platform with unsigned packets",
+            "Give key_file, listen on 127.0.0.1, or say allow_unsigned = true on a network that "
+            "nobody else can reach.",
+        )
+    return {
+        "kind": source.kind,
+        "host": host,
+        "port": port,
+        "key": key.hex(),
+        "topic": source.topic,
+        "connect": source.connect,
+    }
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _web(config: Config, run_dir: Path, machine: dict[str, object]) -> dict[str, Any]:
+    web, state_dir = config.web, state_dir_of(config)
+    return {
+        "host": web.host,
+        "port": web.port,
+        "tokens_file": web.tokens_file or str(state_dir / "tokens.json"),
+        "run_dir": str(run_dir),
+        "presets_dir": str(state_dir / "presets"),
+        "machine": machine,
+        "allowed_hosts": web.allowed_hosts,
+        "engage": "http" if config.operator.engage == "http" else "local",
+        "enable_input": bool(config.operator.enable_input),
+        "tls_cert": web.tls_cert or None,
+        "tls_key": web.tls_key or None,
+    }

@@ -1,0 +1,262 @@
+"""Tunables in the units of people, with bounds that no request can leave."""
+
+from __future__ import annotations
+
+from dataclasses import fields as dataclass_fields
+from math import degrees, radians
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+
+from motionserver.core.axes import AXIS_NAMES, frozen
+from motionserver.core.limits import Machine
+from motionserver.cueing.tuning import Tuning
+from motionserver.settings.fields import (
+    FieldError,
+    TuningError,
+    algorithms,
+    allowed_range,
+    choice,
+    described,
+    number,
+    shown,
+)
+
+_UNITS: Final = {"m": 1.0, "deg": radians(1.0)}
+BOX_FIELDS: Final = tuple(
+    f"box_{axis}_{'m' if index < 3 else 'deg'}" for index, axis in enumerate(AXIS_NAMES)
+)
+_SI_NAMES: Final = {
+    "tilt_rate_deg_s": "tilt_rate",
+    "tilt_acceleration_deg_s2": "tilt_acceleration",
+    "translation_threshold_m_s2": "translation_threshold",
+    "horizon_s": "horizon",
+}
+_ROUNDING: Final = 1e-9
+"""Slack of a box against the machine's, for degrees that came from radians."""
+
+
+def _known(name: str) -> str:
+    if name not in algorithms():
+        raise ValueError("no such algorithm is installed")
+    return name
+
+
+def _box(axis: str, default: float, high: float, unit: str) -> Any:  # noqa: ANN401  (pydantic's Field)
+    return number(
+        default,
+        0.005 if unit == "m" else 0.5,
+        high,
+        unit,
+        group="Workspace",
+        label=axis.capitalize(),
+        meaning=f"Largest {axis} either way that cueing may use.",
+        more="stronger cues, less reserve",
+    )
+
+
+def _weight(default: float, low: float, high: float, label: str, meaning: str, more: str) -> Any:  # noqa: ANN401  (as above)
+    return number(
+        default, low, high, "", group="Optimiser", label=label, meaning=meaning, more=more
+    )
+
+
+_START: Final = Tuning()
+"""Where the defaults stand; here only those are written again that have other units."""
+
+
+class TuningModel(BaseModel):
+    """Everything that may change while the platform moves. Hard limits are not here."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    # fmt: off
+    algorithm: Annotated[str, AfterValidator(_known)] = choice(
+        _START.algorithm, group="Feel", label="Algorithm", meaning="What turns motion into plans."
+    )
+    scale: float = number(
+        _START.scale, 0.0, 1.0, "", group="Feel", label="Scale",
+        meaning="Share of the vehicle's forces and turn rates that is wanted at all.",
+        more="stronger motion, limits reached sooner",
+    )
+    gain: float = number(
+        _START.gain, 0.0, 1.0, "", group="Feel", label="Washout gain",
+        meaning="Gain of the classical washout, on top of the scale.",
+        more="stronger motion; no effect on the MPC",
+    )
+    rotation_gain: float = number(
+        _START.rotation_gain, 0.0, 1.0, "", group="Feel", label="Rotation gain",
+        meaning="Share of the vehicle's own roll, pitch and yaw rate that is shown.",
+        more="livelier turning, less tilt left for sustained forces",
+    )
+    tilt_rate_deg_s: float = number(
+        3.0, 0.5, 12.0, "deg/s", group="Perception", label="Tilt rate",
+        meaning="How fast the cabin may tilt to replace a sustained force; 3 goes unnoticed by "
+        "a passenger, about 6 by a driver at work.",
+        more="sustained forces arrive sooner, tilting may be felt as turning",
+    )
+    tilt_acceleration_deg_s2: float = number(
+        0.3, 0.05, 60.0, "deg/s2", group="Perception", label="Tilt acceleration",
+        meaning="Threshold of angular acceleration; in force only if its weight is above 0.",
+        more="quicker onset of tilt",
+    )
+    tilt_acceleration_weight: float = number(
+        _START.tilt_acceleration_weight, 0.0, 1000.0, "", group="Perception",
+        label="Tilt acceleration weight",
+        meaning="Price of exceeding that threshold; 0 leaves it out.",
+        more="smoother, later tilt",
+    )
+    translation_threshold_m_s2: float = number(
+        0.1, 0.0, 1.0, "m/s2", group="Perception", label="Translation threshold",
+        meaning="Translational acceleration that goes unnoticed; washing out stays below it.",
+        more="faster return to neutral, false cues may be felt",
+    )
+    box_surge_m: float = _box("surge", 0.198, 2.0, "m")
+    box_sway_m: float = _box("sway", 0.220, 2.0, "m")
+    box_heave_m: float = _box("heave", 0.200, 2.0, "m")
+    box_roll_deg: float = _box("roll", 17.5, 45.0, "deg")
+    box_pitch_deg: float = _box("pitch", 16.3, 45.0, "deg")
+    box_yaw_deg: float = _box("yaw", 17.5, 45.0, "deg")
+    halving: Literal["off", "paper", "sound"] = choice(
+        _START.halving, group="Workspace", label="Interval halving",
+        meaning="How position limits shrink until the legs agree: off, as printed in the paper, "
+        "or sound.",
+    )
+    legs: bool = choice(
+        _START.legs, group="Workspace", label="Leg rows",
+        meaning="Leg lengths inside the optimiser; off is the paper's box-only form.",
+    )
+    horizon_s: float = number(
+        2.0, 0.5, 3.5, "s", group="Optimiser", label="Horizon",
+        meaning="How far ahead the optimiser looks.",
+        more="earlier braking before limits, more computing time",
+    )
+    weight_force: float = _weight(
+        _START.weight_force, 0.001, 100.0, "Force weight", "Price of a wrong specific force.",
+        "closer to the wanted force, more travel",
+    )
+    weight_input: float = _weight(
+        _START.weight_input, 0.0, 100.0, "Input weight",
+        "Price of the washout's input leaving the reference.",
+        "closer to plain washout",
+    )
+    weight_change: float = _weight(
+        _START.weight_change, 0.0, 100.0, "Change weight", "Price of changing the input.",
+        "smoother, softer onset",
+    )
+    weight_position: float = _weight(
+        _START.weight_position, 0.0, 100.0, "Position weight", "Price of being away from neutral.",
+        "sooner back at neutral, weaker cues",
+    )
+    filters: Literal["standard", "fig3"] = choice(
+        _START.filters, group="Optimiser", label="Filters",
+        meaning="Filter set of the washout; fig3 is that of the paper's figure 3.",
+    )
+    reference: Literal["constant", "fade", "ar"] = choice(
+        _START.reference, group="Optimiser", label="Reference",
+        meaning="What surge and sway are expected to do next: stay, fade, or follow a fitted "
+        "autoregressive model.",
+    )
+    backend: Literal["daqp", "osqp", "piqp"] = choice(
+        _START.backend, group="Optimiser", label="Solver",
+        meaning="Which solver computes the quadratic programme.",
+    )
+    # fmt: on
+
+    def to_tuning(self) -> Tuning:
+        """The same in SI."""
+        values: dict[str, Any] = self.model_dump(exclude=set(BOX_FIELDS))
+        for name, si_name in _SI_NAMES.items():
+            values[si_name] = values.pop(name) * (radians(1.0) if "_deg" in name else 1.0)
+        units = [_UNITS[name.rsplit("_", 1)[1]] for name in BOX_FIELDS]
+        box = np.array([getattr(self, name) for name in BOX_FIELDS]) * np.array(units)
+        return Tuning(**values, box=frozen(box))
+
+    @classmethod
+    def from_tuning(cls, tuning: Tuning) -> TuningModel:
+        """Write a tuning in the units of people.
+
+        Raises:
+            TuningError: It lies outside the bounds.
+        """
+        values: dict[str, Any] = {
+            item.name: getattr(tuning, item.name)
+            for item in dataclass_fields(Tuning)
+            if item.name != "box"
+        }
+        for name, si_name in _SI_NAMES.items():
+            value = values.pop(si_name)
+            values[name] = round(degrees(value), 9) if "_deg" in name else value
+        for name, value in zip(BOX_FIELDS, tuning.box.tolist(), strict=True):
+            values[name] = round(degrees(value), 9) if name.endswith("_deg") else value
+        return _validated(values)
+
+    def check_machine(self, machine: Machine) -> None:
+        """Make sure that no tunable asks for more than the machine has.
+
+        Raises:
+            TuningError: The box is larger than the machine's.
+        """
+        limits = machine_limits(machine)
+        errors = [
+            FieldError(
+                name,
+                getattr(self, name),
+                _allowed(name, limits),
+                f"more than the {limit:.6g} {name.rsplit('_', 1)[1]} of machine {machine.name}",
+            )
+            for name, limit in limits.items()
+            if getattr(self, name) > limit + _ROUNDING
+        ]
+        if errors:
+            raise TuningError(errors)
+
+
+def machine_limits(machine: Machine) -> dict[str, float]:
+    """Largest values that a machine adds to the bounds of the model, in its units."""
+    return {
+        name: round(value / _UNITS[name.rsplit("_", 1)[1]], 9)
+        for name, value in zip(BOX_FIELDS, machine.box.tolist(), strict=True)
+    }
+
+
+def apply_changes(model: TuningModel, changes: dict[str, object]) -> TuningModel:
+    """Take over some values.
+
+    Raises:
+        TuningError: A name or value that is not allowed; then none is taken.
+    """
+    return _validated(model.model_dump() | changes)
+
+
+def _validated(values: dict[str, object]) -> TuningModel:
+    try:
+        return TuningModel.model_validate(values)
+    except ValidationError as error:
+        raise TuningError([_explained(item) for item in error.errors(include_url=False)]) from None
+
+
+def _explained(item: Any) -> FieldError:  # noqa: ANN401  (pydantic's ErrorDetails)
+    name = str(item["loc"][0]) if item["loc"] else "tuning"
+    if name not in TuningModel.model_fields:
+        known = "a name listed by GET /api/tuning"
+        return FieldError(ascii(name)[1:-1][:60], shown(item["input"]), known, "no such tunable")
+    return FieldError(name, shown(item["input"]), _allowed(name, {}), str(item["msg"]))
+
+
+def describe(machine: Machine | None) -> list[dict[str, object]]:
+    """All tunables for a page or a document, in order, within a machine's limits."""
+    limits = machine_limits(machine) if machine else {}
+    return [described(name, item, limits) for name, item in TuningModel.model_fields.items()]
+
+
+def default_for(machine: Machine) -> TuningModel:
+    """The tuning of a fresh installation on this machine: its whole box, all else default."""
+    limits = machine_limits(machine)
+    defaults = {n: TuningModel.model_fields[n].default for n in BOX_FIELDS}
+    return apply_changes(TuningModel(), {n: min(limits[n], defaults[n]) for n in BOX_FIELDS})
+
+
+def _allowed(name: str, limits: dict[str, float]) -> str:
+    return allowed_range(TuningModel.model_fields[name], limits.get(name))

@@ -1,0 +1,55 @@
+"""The addresses a server needs: taken or tried before anything starts, refused in words."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import socket
+from typing import Any, Final
+
+from motionserver.errors import ConfigError
+
+_PRIVILEGED: Final = "Ports below 1024 need CAP_NET_BIND_SERVICE; or choose another port."
+_HELD: Final = "Choose another port, or stop the program that holds it."
+
+
+def open_link(local: tuple[str, int]) -> socket.socket:
+    """Open the platform's socket.
+
+    Raises:
+        ConfigError: It cannot be bound.
+    """
+    return _bound("[platform] local_host, local_port", *local, socket.SOCK_DGRAM)
+
+
+def try_addresses(sources: list[dict[str, Any]], page: dict[str, Any] | None) -> None:
+    """Bind everything the children will bind, all at once, and let go of it.
+
+    A child that cannot bind would be started again for ever; whoever starts the server learns it
+    here instead.
+
+    Raises:
+        ConfigError: An address is held, is not ours, or is used twice.
+    """
+    with contextlib.ExitStack() as held:
+        for source in sources:
+            where = f"[[sources]] {source['kind']} {source['host']}:{source['port']}"
+            kind = socket.SOCK_STREAM if source["kind"] == "zenoh" else socket.SOCK_DGRAM
+            held.enter_context(_bound(where, source["host"], source["port"], kind))
+        if page is not None:
+            held.enter_context(_bound("[web] port", page["host"], page["port"], socket.SOCK_STREAM))
+
+
+def _bound(where: str, host: str, port: int, kind: socket.SocketKind) -> socket.socket:
+    link = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, kind)
+    try:
+        if kind is socket.SOCK_STREAM:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        link.bind((host, port))
+    except OSError as error:
+        link.close()
+        hint = _PRIVILEGED if error.errno == errno.EACCES else _HELD
+        raise ConfigError(
+            where, f"{host}:{port} cannot be bound ({error.strerror})", hint
+        ) from error
+    return link

@@ -1,0 +1,195 @@
+"""The service: opens the platform's socket, starts and watches guard, planner and page."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import fcntl
+import json
+import logging
+import os
+import signal
+from pathlib import Path
+from typing import Any, Final, TextIO
+
+from motionserver.core.safety.states import CUED
+from motionserver.errors import ConfigError
+from motionserver.supervisor.addresses import open_link, try_addresses
+from motionserver.supervisor.child import Child
+from motionserver.telemetry.link import STATES, GuardClock, Maps
+from motionserver.telemetry.ticker import now_ns
+
+PARK_PATIENCE: Final = 90.0
+"""Longest wait for the guard to park when the service ends [s]."""
+LEFT: Final = (
+    *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
+    *("config.json", "web.json", "tuning.json"),
+)
+"""What a run leaves in its directory, but for the locks."""
+LONGEST_PATH: Final = 70
+"""Longest run directory [bytes]: a unix socket's path has 108 at most."""
+
+log = logging.getLogger("motionserver.supervisor")
+
+
+class Service:
+    """One server on one platform."""
+
+    def __init__(
+        self, resolved: dict[str, Any], config_web: bool, local: tuple[str, int], run_dir: Path
+    ) -> None:
+        """Take the run directory and the platform's socket.
+
+        Args:
+            resolved: What `settings.resolve` made of the configuration.
+            config_web: True if the page is wanted.
+            local: Local address of the platform's socket.
+            run_dir: Where the processes meet.
+
+        Raises:
+            ConfigError: Another server runs here, or an address cannot be bound.
+        """
+        self.run_dir = run_dir
+        with contextlib.ExitStack() as undo:
+            self._lock = undo.enter_context(self._take(run_dir))
+            self._link = undo.enter_context(open_link(local))
+            try_addresses(resolved["sources"], resolved["web"] if config_web else None)
+            undo.pop_all()
+        self.local_port: int = self._link.getsockname()[1]
+        web = dict(resolved["web"])
+        core = {key: value for key, value in resolved.items() if key != "web"}
+        self._clean()
+        for name, content in (("config.json", core), ("web.json", web)):
+            # keys of signed sources are in it
+            (run_dir / name).touch(mode=0o600)
+            (run_dir / name).write_text(json.dumps(content), "utf-8")
+        self._maps = Maps(run_dir, create=True)
+        descriptor = self._link.fileno()
+        guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
+        self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
+        self.planner = Child("planner", ("-m", "motionserver.planner", str(run_dir)))
+        self.planner.may_start = self._is_not_cued
+        self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
+        self.web.wanted = config_web
+        self._leave = asyncio.Event()
+        self.exit_status = 0
+
+    @staticmethod
+    def _take(run_dir: Path) -> TextIO:
+        where, other = "[server] run_dir", "Choose another folder."
+        if len(os.fsencode(run_dir.absolute())) > LONGEST_PATH:
+            raise ConfigError(where, f"{run_dir} is too long a path for sockets", other)
+        try:
+            run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if run_dir.stat().st_uid != os.getuid():
+                raise ConfigError(where, f"{run_dir} belongs to somebody else", other)
+            run_dir.chmod(0o700)
+            lock = (run_dir / "service.lock").open("w")
+        except OSError as error:
+            raise ConfigError(where, f"{run_dir}: {error.strerror}", other) from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            lock.close()
+            raise ConfigError(
+                where,
+                f"another server runs in {run_dir}",
+                "Stop it first: one platform has one server.",
+            ) from error
+        return lock
+
+    def _clean(self) -> None:
+        """Nothing of this or an earlier run may be taken for a living server."""
+        for pattern in LEFT:
+            for stale in self.run_dir.glob(pattern):
+                stale.unlink(missing_ok=True)
+
+    def leave(self) -> None:
+        """End softly: park, then stop everything."""
+        self._leave.set()
+
+    async def run(self) -> int:
+        """Run until told to leave and parked.
+
+        Returns:
+            0 if the guard ended parked, 3 if it ended standing in a fault.
+        """
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self.leave)
+        keepers = [
+            asyncio.create_task(child.keep()) for child in (*self.guards, self.planner, self.web)
+        ]
+        watcher = asyncio.create_task(self._show())
+        await self._leave.wait()
+        log.info("parking")
+        self.planner.wanted = self.web.wanted = False
+        self.exit_status = await self._park()
+        watcher.cancel()
+        await asyncio.gather(
+            self.planner.end(signal.SIGTERM, 3.0), self.web.end(signal.SIGTERM, 3.0)
+        )
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
+        self._link.close()
+        self._clean()
+        self._lock.close()
+        return self.exit_status
+
+    async def _park(self) -> int:
+        """Let the active guard park; the spare is told too, and parks if its turn comes."""
+        active, spare = self._active()
+        for guard in (active, spare):
+            guard.wanted = False
+            guard.signal(signal.SIGTERM)
+        deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
+        result = 3
+        while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
+            try:
+                status = await active.ended(left)
+            except TimeoutError:
+                break
+            if status in (0, 3):
+                result = status
+                break
+            log.warning("%s ended with %s while parking; the other parks", active.name, status)
+            active, spare = spare, active
+            if active.pid is None:
+                await active.start("leave")
+        await asyncio.gather(*(guard.end(signal.SIGKILL, 1.0) for guard in (active, spare)))
+        return result
+
+    def _is_not_cued(self) -> bool:
+        """A planner that died is replaced once the platform parks: its successor knows nothing."""
+        message = self._maps.clock.read()
+        return message is None or STATES[GuardClock.unpack(message[1]).state] not in CUED
+
+    def _active(self) -> tuple[Child, Child]:
+        """The guard that holds the lock, by its own word, and the other."""
+        message = self._maps.guard.read()
+        pid = None if message is None else json.loads(message[1])["pid"]
+        first, second = self.guards
+        return (second, first) if second.pid == pid and pid is not None else (first, second)
+
+    async def _show(self) -> None:
+        """Tell the page who lives."""
+        while True:
+            active, spare = self._active()
+            self._maps.service.write(
+                json.dumps(
+                    {
+                        "pid": os.getpid(),
+                        "t_ns": now_ns(),
+                        "guard": active.pid,
+                        "spare": spare.pid,
+                        "planner": self.planner.pid,
+                        "web": self.web.pid,
+                        "restarts": {
+                            "guard": sum(child.restarts for child in self.guards),
+                            "planner": self.planner.restarts,
+                            "web": self.web.restarts,
+                        },
+                    }
+                ).encode()
+            )
+            await asyncio.sleep(0.1)

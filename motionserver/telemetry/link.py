@@ -1,0 +1,91 @@
+"""The small records that planner and guard exchange through mapped files."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Final
+
+from motionserver.core.plan import MAX_KNOTS
+from motionserver.core.safety.states import State
+from motionserver.core.safety.watchdog import CueStatus
+from motionserver.core.state import DriveMode
+from motionserver.telemetry.mapped import MappedFile
+
+STATES: Final = tuple(State)
+_CLOCK: Final = struct.Struct("<BQdQQQ")
+_CUE: Final = struct.Struct("<QQBQ")
+_PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
+
+
+@dataclass(frozen=True, slots=True)
+class GuardClock:
+    """What the planner must know of the guard, written at every send.
+
+    Attributes:
+        state: Index of the motion state in `STATES`.
+        newest_id: Number of the newest accepted plan; 0 = none.
+        newest_clock: That plan's own time at the last send [s]; negative while it waits.
+        sent_ns: When the last packet was sent [ns].
+        due_ns: When the next one is due [ns].
+        written_ns: When this was written [ns].
+    """
+
+    state: int
+    newest_id: int
+    newest_clock: float
+    sent_ns: int
+    due_ns: int
+    written_ns: int
+
+    def pack(self) -> bytes:
+        """Write as bytes."""
+        return _CLOCK.pack(*astuple(self))
+
+    @classmethod
+    def unpack(cls, data: bytes) -> GuardClock:
+        """Read what `pack` wrote."""
+        return cls(*_CLOCK.unpack(data))
+
+
+def pack_cue(status: CueStatus, now_ns: int) -> bytes:
+    """Write the planner's view of the source, with the planner's own heartbeat."""
+    return _CUE.pack(status.newest_ns, status.stale_after_ns, status.mode, now_ns)
+
+
+def unpack_cue(data: bytes) -> CueStatus:
+    """Read what `pack_cue` wrote.
+
+    Raises:
+        ValueError: The mode is unknown.
+        struct.error: The length is wrong.
+    """
+    newest, stale_after, mode, _ = _CUE.unpack(data)
+    return CueStatus(newest, stale_after, DriveMode(mode))
+
+
+class Maps:
+    """The mapped files of one run directory.
+
+    Attributes:
+        proposal: Planner to guard: the newest proposed plan.
+        accepted: Guard to planner: the newest accepted plan.
+        clock: Guard to planner: `GuardClock`.
+        cue: Planner to guard: the source's status.
+        guard: Guard to page: snapshot as JSON.
+        planner: Planner to page: snapshot as JSON.
+        service: Supervisor to page: processes as JSON.
+    """
+
+    def __init__(self, run_dir: Path, create: bool = False) -> None:
+        def opened(name: str, capacity: int) -> MappedFile:
+            return MappedFile(run_dir / f"{name}.map", capacity if create else None)
+
+        self.proposal = opened("proposal", _PLAN_BYTES)
+        self.accepted = opened("accepted", _PLAN_BYTES)
+        self.clock = opened("clock", _CLOCK.size)
+        self.cue = opened("cue", _CUE.size)
+        self.guard = opened("guard", 32768)
+        self.planner = opened("planner", 32768)
+        self.service = opened("service", 8192)

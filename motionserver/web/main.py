@@ -1,0 +1,66 @@
+"""Start of the page's process: nice, bounded, and refused where it would be open to strangers."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+
+from motionserver.telemetry.parent import follow_parent
+from motionserver.web.config import WebConfig, WebConfigError, read_config
+from motionserver.web.connection import PatientProtocol
+from motionserver.web.wiring import wired_app
+
+_NICENESS = 10
+
+
+def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
+    """The HTTP server, with every limit that keeps a flood from costing more than its answers."""
+    return uvicorn.Server(
+        uvicorn.Config(
+            app,
+            host=config.host,
+            port=config.port,
+            ssl_certfile=config.tls_cert,
+            ssl_keyfile=config.tls_key,
+            http=PatientProtocol,
+            ws="none",
+            lifespan="off",
+            limit_concurrency=64,
+            timeout_keep_alive=5,
+            timeout_graceful_shutdown=1,
+            h11_max_incomplete_event_size=16 * 1024,
+            proxy_headers=False,
+            server_header=False,
+            access_log=False,
+            log_level="warning",
+        )
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Serve the page until a signal ends it.
+
+    Args:
+        arguments: One path, the JSON file of the configuration.
+
+    Returns:
+        Exit status: 0 ended by signal, 2 refused to start.
+    """
+    if len(arguments) != 1:
+        sys.stderr.write("usage: python -m motionserver.web <configuration.json>\n")
+        return 2
+    try:
+        config = read_config(Path(arguments[0]))
+        config.check()
+        app = wired_app(config)
+    except WebConfigError as error:
+        sys.stderr.write(f"page not started: {error}\n")
+        return 2
+    follow_parent()
+    os.nice(_NICENESS)
+    server(app, config).run()
+    return 0

@@ -1,0 +1,34 @@
+// Requests with the token of this tab; it is kept in sessionStorage and sent in a header only.
+const KEY = "motionserver-token";
+
+export const token = () => sessionStorage.getItem(KEY) || "";
+
+export function setToken(value) {
+  if (value) sessionStorage.setItem(KEY, value);
+  else sessionStorage.removeItem(KEY);
+}
+
+export function headers(more = {}) {
+  return token() ? { ...more, Authorization: `Bearer ${token()}` } : more;
+}
+
+export async function send(method, path, { body, ifMatch } = {}) {
+  const named = {};
+  if (body !== undefined) named["Content-Type"] = "application/json";
+  if (ifMatch !== undefined) named["If-Match"] = `"${ifMatch}"`;
+  try {
+    const answer = await fetch(path, {
+      method, headers: headers(named), body: body === undefined ? undefined : JSON.stringify(body),
+      cache: "no-store", credentials: "omit",
+    });
+    return { ok: answer.ok, status: answer.status, headers: answer.headers, body: await answer.json() };
+  } catch {
+    return { ok: false, status: 0, headers: new Headers(), body: { error: "the server does not answer", do: "is it running?" } };
+  }
+}
+
+export function sentence(body) {
+  const parts = [body.error || "refused"];
+  if (body.do && body.do !== "-") parts.push(body.do);
+  return parts.join(": ");
+}

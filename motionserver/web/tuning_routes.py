@@ -1,0 +1,141 @@
+"""Routes of the tuning: read, change, undo, presets."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from motionserver.settings.fields import TuningError
+from motionserver.settings.tuning import TuningModel, apply_changes, default_for, describe
+from motionserver.settings.tuning_presets import Preset
+from motionserver.web.auth import Role
+from motionserver.web.desk import Desk, read_json
+from motionserver.web.refusal import Refusal, json_response
+from motionserver.web.requests import tuning_refusal
+
+_TAG: Final = re.compile(r'"([0-9]{1,15})"')
+
+
+def tuning_routes(desk: Desk) -> APIRouter:
+    """All routes below /api/tuning and /api/presets."""
+    router = APIRouter()
+    machine = desk.config.hexapod()
+    fields = describe(machine)
+
+    @router.get("/api/tuning")
+    async def tuning(request: Request) -> Response:
+        desk.require(request, Role.VIEWER)
+        answer = await desk.planner.ask({"op": "tuning"}, request.url.path)
+        return _tuning_response(answer, request, fields=fields)
+
+    @router.patch("/api/tuning")
+    async def tune(request: Request) -> Response:
+        caller = desk.require(request, Role.TUNER)
+        version = _if_match(request)
+        changes = await read_json(request)
+        _check(changes, request.url.path)
+        asked = {"op": "tune", "if_version": version, "changes": changes}
+        answer = await desk.planner.ask(asked, request.url.path)
+        desk.audit.note("tune", caller, _result(answer), version=version, changes=changes)
+        return _tuning_response(answer, request)
+
+    @router.post("/api/tuning/undo")
+    async def undo(request: Request) -> Response:
+        caller = desk.require(request, Role.TUNER)
+        version = _if_match(request)
+        answer = await desk.planner.ask({"op": "undo", "if_version": version}, request.url.path)
+        desk.audit.note("undo", caller, _result(answer), version=version)
+        return _tuning_response(answer, request)
+
+    @router.get("/api/presets")
+    async def presets(request: Request) -> Response:
+        desk.require(request, Role.VIEWER)
+        found = []
+        for name in desk.presets.names():
+            try:
+                found.append(_summary(desk.presets.read(name)))
+            except (KeyError, TuningError):
+                continue
+        return json_response({"presets": found})
+
+    @router.get("/api/presets/{name}")
+    async def preset(request: Request, name: str) -> Response:
+        desk.require(request, Role.VIEWER)
+        try:
+            found = desk.presets.read(name)
+        except KeyError:
+            raise _no_preset(request.url.path) from None
+        except TuningError as error:
+            raise _invalid(error, request.url.path) from error
+        return json_response(_summary(found) | {"values": found.values})
+
+    @router.put("/api/presets/{name}")
+    async def save(request: Request, name: str) -> Response:
+        caller = desk.require(request, Role.TUNER)
+        values = await read_json(request, empty={})
+        path = request.url.path
+        if not values:
+            values = dict((await desk.planner.ask({"op": "tuning"}, path)).get("values") or {})
+        _check(values, path)
+        try:
+            saved = desk.presets.save(name, "Saved from the page.", values)
+        except TuningError as error:
+            raise _invalid(error, path) from error
+        except OSError as error:
+            raise Refusal(507, f"not saved: {error.strerror}", path, "a writable presets directory",
+                          "look at the disk") from error  # fmt: skip
+        desk.audit.note("save preset", caller, "done", name=name)
+        return json_response(_summary(saved) | {"values": saved.values}, 201)
+
+    def _check(changes: dict[str, Any], path: str) -> None:
+        """Say what is wrong before the planner is troubled; it checks again."""
+        try:
+            wanted = apply_changes(default_for(machine), changes)
+            wanted.check_machine(machine)
+        except TuningError as error:
+            raise _invalid(error, path) from error
+
+    return router
+
+
+def _if_match(request: Request) -> int:
+    tag = request.headers.get("if-match")
+    path = request.url.path
+    if tag is None:
+        raise Refusal(428, "If-Match is missing", path, 'If-Match: "<version>"',
+                      "read GET /api/tuning and send its ETag")  # fmt: skip
+    match = _TAG.fullmatch(tag.strip())
+    if match is None:
+        raise Refusal(412, "If-Match is not one version", path, 'If-Match: "<version>"',
+                      "send the ETag of GET /api/tuning as it is")  # fmt: skip
+    return int(match[1])
+
+
+def _tuning_response(answer: dict[str, Any], request: Request, **more: object) -> Response:
+    if not answer.get("ok"):
+        raise tuning_refusal(answer, request.url.path)
+    body = {"version": answer["version"], "values": answer["values"], **more}
+    return json_response(body, headers={"etag": f'"{answer["version"]}"'})
+
+
+def _result(answer: dict[str, Any]) -> str:
+    return "done" if answer.get("ok") else str(answer.get("kind"))
+
+
+def _summary(preset: Preset) -> dict[str, Any]:
+    return {"name": preset.name, "about": preset.about, "built_in": preset.built_in}
+
+
+def _no_preset(path: str) -> Refusal:
+    return Refusal(404, "no preset of that name", path, "a name listed by GET /api/presets",
+                   "choose one of these")  # fmt: skip
+
+
+def _invalid(error: TuningError, path: str) -> Refusal:
+    details = [item.to_mapping() for item in error.errors]
+    known = len(TuningModel.model_fields)
+    return Refusal(422, "values outside what is allowed", path, "see details",
+                   "correct the values named in details", details=details[: 2 * known])  # fmt: skip

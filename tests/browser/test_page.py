@@ -1,0 +1,235 @@
+"""The page in a real browser, against the real server process, over the real request sockets."""
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from browser.scene import TOKENS, Peers, Scene, t2_compact, write_configuration
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+ROOT = Path(__file__).parents[2]
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no chromium at /usr/bin/chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-gpu", "--disable-quic"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield browser
+        browser.close()
+
+
+class Site:
+    """A server process with a scene behind it."""
+
+    def __init__(self, folder):
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        machine = t2_compact()
+        self.url = f"http://127.0.0.1:{self.port}/"
+        self.scene = Scene(machine)
+        self.configuration = write_configuration(folder, self.port, machine)
+        self.process = None
+
+    def start(self):
+        path = os.pathsep.join(str(ROOT / part) for part in ("", "protocol", "clients"))
+        command = [sys.executable, "-m", "motionserver.web", str(self.configuration)]
+        self.process = subprocess.Popen(command, env=os.environ | {"PYTHONPATH": path})
+        pause = threading.Event()
+        for _ in range(600):
+            try:
+                with urllib.request.urlopen(self.url + "healthz", timeout=1):
+                    return
+            except (urllib.error.URLError, ConnectionError):
+                pause.wait(0.05)
+        raise AssertionError("the server did not answer in 30 s")
+
+    def stop(self):
+        if self.process is not None:
+            self.process.terminate()
+            self.process.wait(15)
+            self.process = None
+
+
+@pytest.fixture
+def site(tmp_path):
+    place = Site(tmp_path)
+    with Peers(tmp_path, place.scene):
+        place.start()
+        yield place
+        place.stop()
+
+
+class Visit:
+    """A page and everything it complained about."""
+
+    def __init__(self, browser, site, width=1440, height=900):
+        self.complaints = []
+        self.page = browser.new_page(viewport={"width": width, "height": height})
+        self.page.set_default_timeout(15000)
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
+        self.page.on("console", self.listen)
+        self.page.goto(site.url)
+
+    def listen(self, message):
+        if "Security Policy" in message.text or "Uncaught" in message.text:
+            self.complaints.append(message.text)
+
+    def identify(self, role):
+        self.page.fill("#token", TOKENS[role])
+        self.page.click("#token-use")
+        self.expect("#role", role)
+
+    def expect(self, selector, text):
+        self.page.wait_for_function(
+            "([s, t]) => document.querySelector(s)?.textContent.includes(t)", arg=[selector, text]
+        )
+
+    def value(self, name):
+        return self.page.input_value(f"#tune-{name}")
+
+
+@pytest.fixture
+def visit(chromium, site):
+    visits = []
+
+    def open_page(**size):
+        visits.append(Visit(chromium, site, **size))
+        return visits[-1]
+
+    yield open_page
+    for one in visits:
+        one.page.close()
+        assert one.complaints == []
+
+
+def test_operator_engages_tunes_undoes_and_parks(site, visit):
+    one = visit()
+    one.expect("#state", "PARKED")
+    assert one.page.is_disabled("#engage")
+    assert one.page.is_disabled("#park")
+    one.identify("operator")
+    one.page.click("#engage:enabled")
+    one.expect("#state", "RUN")
+    one.page.fill("#tune-scale", "0.4")
+    one.page.fill("#tune-tilt_rate_deg_s", "6")
+    one.expect("#apply", "Apply 2 changes")
+    one.page.click("#apply")
+    one.expect("#version", "version 2")
+    assert (site.scene.book.model.scale, site.scene.book.model.tilt_rate_deg_s) == (0.4, 6.0)
+    one.page.click("#undo:enabled")
+    one.expect("#version", "version 3")
+    assert site.scene.book.model.scale == 0.6
+    assert one.value("scale") == "0.6"
+    one.page.click("#park")
+    one.expect("#state", "PARK")
+    one.expect("#events", "park asked by http")
+
+
+def test_viewer_may_look_and_park_but_not_tune(site, visit):
+    one = visit()
+    one.identify("viewer")
+    one.page.fill("#tune-scale", "0.4")
+    assert one.page.is_disabled("#apply")
+    assert one.page.is_disabled("#engage")
+    site.scene.put("RUN", "by hand")
+    one.page.click("#park:enabled")
+    one.expect("#answer", "park: accepted")
+
+
+def test_wrong_values_and_stale_versions_are_explained_at_the_field(site, visit):
+    one = visit()
+    one.identify("tuner")
+    one.page.fill("#tune-scale", "1.7")
+    one.page.click("#apply:enabled")
+    one.expect(".field.wrong .wrong-text", "allowed 0 to 1")
+    assert site.scene.book.version == 1
+    one.page.fill("#tune-scale", "0.5")
+    book = site.scene.book
+    book.answer({"op": "tune", "if_version": 1, "changes": {"horizon_s": 1.5}})
+    one.page.click("#apply:enabled")
+    one.expect("#tuning-answer", "version 2")
+    assert book.model.scale == 0.6
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 3")
+    assert book.model.scale == 0.5
+
+
+def test_presets_are_saved_loaded_and_applied(site, visit):
+    one = visit()
+    one.identify("tuner")
+    one.page.fill("#preset-name", "mine")
+    one.page.click("#preset-save")
+    one.expect("#tuning-answer", "Saved")
+    one.page.select_option("#preset", "paper-2014")
+    one.page.click("#preset-load")
+    one.expect("#tuning-answer", "in the form")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 2")
+    assert site.scene.book.model.filters == "fig3"
+    assert not site.scene.book.model.legs
+    one.page.select_option("#preset", "mine")
+    one.page.click("#preset-load")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 3")
+    assert site.scene.book.model.filters == "standard"
+
+
+def test_silence_is_said_and_ends_by_itself(site, visit):
+    one = visit()
+    one.expect("#link", "live")
+    site.scene.dead.add("planner")
+    one.expect("#banner", "planner has not reported")
+    site.scene.dead.add("guard")
+    one.expect("#banner", "guard has not reported")
+    one.expect("#state", "UNKNOWN")
+    site.scene.dead.clear()
+    one.page.wait_for_selector("#banner", state="hidden")
+    site.stop()
+    one.expect("#banner", "What you see is old")
+    assert one.page.evaluate("document.body.classList.contains('stale')")
+    site.start()
+    one.page.wait_for_selector("#banner", state="hidden")
+    one.expect("#link", "live")
+
+
+def test_hostile_text_is_shown_as_text(site, visit):
+    hostile = "<img src=x onerror=alert(1)><script>alert(2)</script>"
+    site.scene.put("PARKED", hostile)
+    one = visit()
+    one.expect("#reason", hostile)
+    one.expect("#events", hostile)
+    assert one.page.evaluate("document.querySelectorAll('main img, main script').length") == 0
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_page_fits_and_everything_is_drawn(site, visit, tmp_path, width, height):
+    site.scene.put("RUN", "source 10.0.0.12:40312 is fresh")
+    one = visit(width=width, height=height)
+    one.expect("#forces", "felt")
+    one.page.wait_for_function(
+        """() => [...document.querySelectorAll("canvas")].length === 10 &&
+          [...document.querySelectorAll("canvas")].every((c) => {
+            const data = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+            return data.some((v) => v > 0);
+          })"""
+    )
+    assert one.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert one.page.evaluate("performance.getEntriesByType('resource').every("
+                             "(r) => r.name.startsWith(location.origin))")  # fmt: skip
+    one.page.screenshot(path=tmp_path / f"page-{width}.png", full_page=True)

@@ -1,0 +1,105 @@
+"""Restarts while raised, dry runs and gaps of the guard's own loop, on virtual time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from device_model import TICK_NS
+from guard_scenes import away, bench, legal
+from own_kinematics import lengths
+
+from motionserver.core.device import Order, Phase
+from motionserver.core.safety.states import RAISED, State
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        (0.05, 0.03, 0.02, 0.05, -0.04, 0.1),
+        (0.0, 0.0, -0.16, 0.0, 0.0, 0.0),
+        (-0.1, 0.1, 0.0, 0.0, 0.1, -0.1),
+    ],
+)
+@pytest.mark.parametrize("as_pose", [False, True])
+def test_a_restart_while_raised_begins_where_it_stands(pose, as_pose):
+    b = bench()
+    b.device.put_up(np.array(pose))
+    if as_pose:
+        whole = b.device.answer
+        b.device.answer = lambda now: replace(whole(now), legs=None, pose=np.array(pose))
+    b.until("PARKING", 1.0)
+    b.run(0.1)
+    first = next(s for s in b.sent if s.order is Order.FOLLOW)
+    assert first.legs == pytest.approx(lengths(b.machine, np.array(pose))[0], abs=1e-8)
+    if not as_pose:
+        b.until("PARKED", 30.0)
+        legal(b)
+
+
+def test_a_restart_a_hair_outside_is_drawn_inside():
+    b = bench()
+    pose = np.array([0.0, 0.0, 0.1999, 0.0, 0.0, 0.0])
+    b.device.put_up(pose)
+    b.until("PARKING", 1.0)
+    b.run(0.1)
+    first = next(s for s in b.sent if s.order is Order.FOLLOW)
+    off = np.abs(first.legs - lengths(b.machine, pose)[0]).max()
+    assert 0.0 < off < 0.005
+    b.until("PARKED", 30.0)
+    legal(b)
+
+
+def test_a_dry_run_moves_nothing():
+    b = bench(dry_run=True)
+    b.until("PARKED", 1.0)
+    b.tick()
+    b.tick("engage")
+    b.until("RUN", 3.0)
+    b.run(2.0)
+    assert b.state == "RUN"
+    assert {s.order for s in b.sent} == {Order.WAIT}
+    assert b.device.phase is Phase.DOWN
+    b.tick("park")
+    b.until("PARKED", 20.0)
+
+
+def test_a_short_gap_of_the_loop_is_only_an_event():
+    b = bench().engaged()
+    away(b)
+    clock = b.record.playback.clock
+    b.source = True
+    b.tick(gap_ns=290_000_000)
+    assert b.state == "RUN"
+    assert b.record.playback.clock - clock < 0.1
+    b.run(1.0)
+    assert b.state == "RUN"
+
+
+@pytest.mark.parametrize("gap", [0.31, 5.0])
+def test_a_long_gap_of_the_loop_holds(gap):
+    b = bench().engaged()
+    away(b)
+    b.tick(gap_ns=int(gap * 1e9))
+    assert b.state == "HOLD"
+    assert "loop" in b.record.reason
+    b.until("RUN", 2.0)
+    legal(b)
+
+
+def test_gaps_do_not_excuse_a_silent_device():
+    b = bench().engaged()
+    b.device.silent = True
+    for _ in range(20):
+        b.tick(gap_ns=60_000_000)
+    assert b.state == "FAULT"
+
+
+def test_states_and_counters_are_told():
+    b = bench().engaged()
+    record = b.record
+    assert record.counters["entered_run"] == 1
+    assert record.since_ns <= b.now
+    assert [text.split(":")[0] for _, text in record.events][-1] == "READY -> RUN"
+    assert State(b.state) in RAISED
+    assert record.counters["setpoints"] == len(b.sent)
+    assert pytest.approx(1e9, rel=1e-6) == TICK_NS * 240

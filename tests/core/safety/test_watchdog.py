@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from machines import compact
+from own_kinematics import lengths
+
+from motionserver.core.device import Feedback, Phase
+from motionserver.core.safety.watchdog import CueStatus, DeviceWatch, Patience, SourceWatch
+from motionserver.core.state import DriveMode
+
+MS = 1_000_000
+ZERO = np.zeros(6)
+
+
+def watch(period=1 / 60):
+    return DeviceWatch(compact(), Patience(), period)
+
+
+def answer(at_ms, **more):
+    return Feedback(at_ms * MS, Phase.UP, "ENGAGED", **more)
+
+
+def test_before_the_first_answer():
+    device = watch()
+    assert device.age(5) == float("inf")
+    assert device.is_lost(5)
+    assert device.valid_for(5) == 0.0
+    assert device.legs() is None
+    device.excuse(5)
+    assert device.is_lost(6)
+    assert device.track(5, ZERO, ZERO) is False
+
+
+@pytest.mark.parametrize(("period", "late_ms"), [(1 / 60, 100), (0.02, 120), (0.05, 300)])
+def test_lost_is_older_than_100_ms_and_six_periods(period, late_ms):
+    device = watch(period)
+    device.answered(answer(1000))
+    assert not device.is_lost((1000 + late_ms) * MS)
+    assert device.is_lost((1000 + late_ms) * MS + 1)
+
+
+def test_validity_begins_anew_after_a_break():
+    device = watch()
+    for at in (0, 90, 180):
+        device.answered(answer(at))
+    assert device.valid_for(190 * MS) == pytest.approx(0.19)
+    assert device.valid_for(281 * MS) == 0.0
+    device.answered(answer(290))
+    assert device.valid_for(300 * MS) == pytest.approx(0.01)
+
+
+def test_an_excuse_holds_once_and_for_one_answer():
+    device = watch()
+    device.answered(answer(0))
+    device.excuse(500 * MS)
+    assert not device.is_lost(600 * MS)
+    device.excuse(590 * MS)
+    assert device.is_lost(601 * MS)
+    device.answered(answer(595))
+    assert device.valid_for(600 * MS) == pytest.approx(0.6)
+
+
+def test_tracking_is_by_leg_with_room_for_speed_and_time():
+    device = watch()
+    legs = lengths(compact(), ZERO)[0]
+    device.answered(answer(0, legs=legs))
+    wanted = legs + 0.0099
+    assert not device.track(0, wanted, ZERO)
+    assert device.error == pytest.approx(0.0099)
+    far = legs + np.array([0.0, 0.0, 0.012, 0.0, 0.0, 0.0])
+    assert not device.track(0, far, ZERO)
+    assert not device.track(100 * MS, far, ZERO)
+    assert device.track(101 * MS, far, ZERO)
+    assert not device.track(102 * MS, far, np.full(6, 0.02))
+    assert not device.track(103 * MS, far, ZERO)
+    device.forgive()
+    assert device.error == 0.0
+    assert not device.track(300 * MS, far, ZERO)
+
+
+def test_a_pose_is_as_good_as_legs():
+    device = watch()
+    pose = np.array([0.05, 0.0, 0.02, 0.1, 0.0, 0.1])
+    device.answered(answer(0, pose=pose))
+    assert device.legs() == pytest.approx(lengths(compact(), pose)[0], abs=1e-12)
+
+
+def test_a_source_is_stale_by_age_and_no_claim_beats_300_ms():
+    assert CueStatus().is_stale(10**15)
+    status = CueStatus(1000 * MS, 150 * MS)
+    assert not status.is_stale(1150 * MS)
+    assert status.is_stale(1150 * MS + 1)
+    patient = CueStatus(1000 * MS, 10**15)
+    assert not patient.is_stale(1300 * MS)
+    assert patient.is_stale(1300 * MS + 1)
+
+
+def test_a_source_drives_or_is_silent():
+    source = SourceWatch()
+    assert (source.driving_for(0), source.silent_for(0)) == (0.0, 0.0)
+    source.update(0, None)
+    assert source.silent_for(500 * MS) == 0.5
+    for at in range(1000, 2000, 10):
+        source.update(at * MS, CueStatus(at * MS, 150 * MS))
+    assert source.driving_for(1990 * MS) == pytest.approx(0.99)
+    assert source.silent_for(1990 * MS) == 0.0
+    assert source.is_fresh(1990 * MS)
+    for mode in (DriveMode.PAUSE, DriveMode.BYE):
+        source.update(2000 * MS, CueStatus(2000 * MS, 150 * MS, mode))
+        assert source.driving_for(2000 * MS) == 0.0
+        assert source.is_paused is (mode is DriveMode.PAUSE)
+    source.update(2010 * MS, CueStatus(2010 * MS, 150 * MS, DriveMode.TELEPORT))
+    source.update(2100 * MS, None)
+    assert source.driving_for(2100 * MS) == pytest.approx(0.09)
+    source.update(2161 * MS, None)
+    assert source.driving_for(2161 * MS) == 0.0
+    assert not source.is_fresh(2161 * MS)

@@ -1,0 +1,99 @@
+"""Proposals without end against the guard, every emitted setpoint judged by other kinematics.
+
+The whole campaign, a million proposals in twenty blocks of their own seeds; two halves that may
+run side by side (``-k west`` and ``-k east``):
+
+    pytest -m campaign tests/core/test_proposals_campaign.py -s
+
+With ``MOTION_CAMPAIGN=FILE`` each block appends its figures to FILE and is skipped when they are
+already there, so that an interrupted campaign goes on where it stopped.
+"""
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from device_model import Bench
+from executed import Executed
+from machines import compact
+from proposals import Proposer
+
+BLOCK = 50_000
+REASONS = (
+    "malformed",
+    "not-finite",
+    "wrong-parent",
+    "too-late",
+    "too-early",
+    "not-at-rest",
+    "discontinuous",
+    "leg-length",
+    "leg-speed",
+    "leg-acceleration",
+    "leg-jerk",
+    "joint-angle",
+    "conditioning",
+    "no-way-home",
+)
+
+
+def propose_many(seed, count):
+    bench = Bench(compact(), plan_period=0.2).engaged()
+    bench.plan, bench.plan_every = Proposer(bench.machine, seed), 1
+    start = bench.record.counters.copy()
+    executed = Executed(bench)
+    begin = time.perf_counter()
+    for _ in range(count):
+        executed.tick()
+    assert set(bench.seen[4:]) <= {"RUN", "HOLD"}
+    counted = bench.record.counters - start
+    shares = {r: counted[f"rejected_{r}"] / count for r in REASONS}
+    assert counted["plans_accepted"] + counted["plans_rejected"] == count
+    figures = executed.judge(np.random.default_rng(seed).random())
+    accepted = counted["plans_accepted"] / count
+    seconds = time.perf_counter() - begin
+    return {"seed": seed, "count": count, "accepted": accepted, **figures, **shares, "s": seconds}
+
+
+def hold_to_account(found):
+    assert found["legs_off"] < 1e-12
+    assert found["pose_off"] < 1e-9
+    for rate in ("wire", "fine"):
+        assert max(found[rate].values()) <= 1.0, found[rate]
+    assert found["accepted"] >= 0.1
+    assert {r: found[r] for r in REASONS if found[r] < 0.01} == {}
+
+
+def test_some_thousand_proposals():
+    found = propose_many(seed=7, count=3_000)
+    found |= {r: max(found[r], 0.01) for r in REASONS if found[r] > 0.0}
+    hold_to_account(found)
+
+
+@pytest.mark.campaign
+@pytest.mark.timeout(0)
+@pytest.mark.parametrize("block", [f"{'west' if i < 10 else 'east'}{i:02d}" for i in range(20)])
+def test_a_million_proposals(block):
+    seed = 1000 + int(block[4:])
+    log = os.environ.get("MOTION_CAMPAIGN")
+    if log and Path(log).exists():
+        done = [json.loads(line)["seed"] for line in Path(log).read_text().splitlines()]
+        if seed in done:
+            pytest.skip("already in the log")
+    found = propose_many(seed, BLOCK)
+    line = json.dumps({key: _short(value) for key, value in found.items()})
+    sys.stdout.write(line + "\n")
+    if log:
+        with Path(log).open("a") as file:
+            file.write(line + "\n")
+    hold_to_account(found)
+
+
+def _short(value):
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    return round(value, 6) if isinstance(value, float) and value > 1e-3 else value

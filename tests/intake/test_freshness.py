@@ -1,0 +1,81 @@
+"""Alive or stale, by arrival only."""
+
+from itertools import accumulate
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from motionserver.core.intake.freshness import MS, SECOND_NS, Freshness
+
+
+def after(*gaps_ms: float) -> tuple[Freshness, int]:
+    fresh = Freshness()
+    times = [int(t * MS) for t in accumulate((1000.0, *gaps_ms))]
+    for time in times:
+        fresh.arrived(time)
+    return fresh, times[-1]
+
+
+def test_nothing_has_come() -> None:
+    fresh = Freshness()
+    assert fresh.newest_ns is None
+    assert fresh.age_ns(5) is None
+    assert fresh.is_stale(5)
+    assert fresh.fresh_for_ns(5) == 0
+    assert fresh.rate_hz() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("gaps", "interval", "stale_after"),
+    [
+        ([], 100, 300),
+        ([10], 100, 300),
+        ([10, 10, 10], 10, 50),
+        ([1, 1, 1], 5, 50),
+        ([20] * 5, 20, 60),
+        ([20, 20, 200, 20, 20], 20, 60),
+        ([400, 400, 100], 100, 300),
+    ],
+)
+def test_median_interval_and_stale_rule(
+    gaps: list[float], interval: float, stale_after: float
+) -> None:
+    fresh, now = after(*gaps)
+    assert fresh.interval_ns() == interval * MS
+    assert fresh.stale_after_ns() == stale_after * MS
+    assert not fresh.is_stale(now + int(stale_after * MS))
+    assert fresh.is_stale(now + int(stale_after * MS) + 1)
+
+
+def test_only_the_last_second_counts() -> None:
+    fresh, now = after(*[100.0] * 10, *[10.0] * 100)
+    assert fresh.interval_ns() == 10 * MS
+    assert fresh.rate_hz() == pytest.approx(100.0)
+    fresh.arrived(now + 2 * SECOND_NS)
+    assert fresh.interval_ns() == 100 * MS
+    assert fresh.rate_hz() == 0.0
+
+
+def test_fresh_since_the_last_break() -> None:
+    fresh, now = after(*[10.0] * 20)
+    assert fresh.fresh_for_ns(now) == 200 * MS
+    assert fresh.fresh_for_ns(now + 60 * MS) == 0
+    fresh.arrived(now + 60 * MS)
+    fresh.arrived(now + 70 * MS)
+    assert fresh.fresh_for_ns(now + 70 * MS) == 10 * MS
+
+
+def test_bursts_at_one_instant_have_no_rate() -> None:
+    fresh, now = after(0.0, 0.0)
+    assert fresh.rate_hz() == 0.0
+    assert fresh.age_ns(now + 7) == 7
+
+
+@given(st.lists(st.integers(0, 3 * SECOND_NS), min_size=1, max_size=60))
+def test_patience_is_always_between_50_and_300_ms(gaps: list[int]) -> None:
+    fresh = Freshness()
+    for time in accumulate(gaps):
+        fresh.arrived(time)
+        assert 50 * MS <= fresh.stale_after_ns() <= 300 * MS
+        assert not fresh.is_stale(time)
