@@ -34,13 +34,21 @@ def main() -> int:
     scheduling = take_priority(50, options.realtime)
     gc.collect()
     gc.freeze()
-    with (run_dir / "guard.lock").open("w") as lock:
+    with (run_dir / "guard.lock").open("a+") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
+        lock.seek(0)
+        ended = lock.read()
+        if told and ended:
+            # the guard before it parked and left in order: nothing remains to be done
+            return int(ended)
+        lock.truncate(0)
         loop = GuardLoop(options, run_dir, link, scheduling)
         signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
         if told or sys.argv[3:] == ["leave"]:
             loop.ask_to_leave("told before its turn came")
-        return asyncio.run(loop.run())
+        status = asyncio.run(loop.run())
+        lock.write(str(status))
+        return status
 
 
 if __name__ == "__main__":

@@ -98,10 +98,7 @@ def test_a_killed_supervisor_leaves_a_guard_that_parks_and_ends(tmp_path: Path) 
         os.kill(rig.server.pid, signal.SIGKILL)
         rig.server.wait(10.0)
         until(lambda: not rig.leftovers(), "all children to end")
-        way = rig.transitions()
-        # the spare has a turn of its own, finds the base down, and ends as well
-        assert way[4:6] == [("RUN", "PARKING"), BACK_TO_PARKED]
-        assert way[6:] in ([], [("OFFLINE", "PARKED")])
+        assert rig.transitions()[4:] == [("RUN", "PARKING"), BACK_TO_PARKED]
         verdict = rig.verdict()
     assert_soft(verdict)
     assert verdict["is_parked"]
