@@ -48,11 +48,11 @@ class AutoRegression:
 
     def forecast_matrix(self, steps: int) -> Array:
         """Map from the past (p,), newest first, to the next ``steps`` values: (steps, p)."""
-        weights = self.stable_weights()
-        out = np.empty((steps, self.order))
-        rows = np.eye(self.order)
-        for step in range(steps):
-            newest = weights @ rows
-            out[step] = newest
-            rows = np.concatenate((newest[None], rows[:-1]))
-        return out
+        companion = np.eye(self.order, k=-1)
+        companion[0] = self.stable_weights()
+        # first rows of its powers; every round doubles how many are known
+        rows, power = companion[:1], companion
+        while len(rows) < steps:
+            rows = np.concatenate((rows, rows @ power))
+            power = power @ power
+        return rows[:steps]

@@ -113,8 +113,9 @@ class Reference:
             self._history[0] = self._stages[1]
         self._count += 1
         sampled = self._history[:: self._stride]
-        if self._count % self._stride == 0:
-            for axis, model in enumerate(self._models):
+        for axis, model in enumerate(self._models):
+            # surge and sway learn in different ticks, so that none is much longer than the rest
+            if (self._count + axis * (self._stride // 2)) % self._stride == 0:
                 model.learn(sampled[1:, axis], float(sampled[0, axis]))
                 self._forecasts[axis] = model.forecast_matrix(len(self._steps) - 1)
         out = np.empty((len(self._instants), 2))

@@ -23,7 +23,7 @@ class Piqp:
 
     name = "piqp"
 
-    def __init__(self, iterations: int = 60, tolerance: float = 1e-6) -> None:
+    def __init__(self, iterations: int = 60, tolerance: float = 1e-8) -> None:
         self._iterations = iterations
         self._tolerance = tolerance
         self._solver: piqp.DenseSolver | None = None
