@@ -36,6 +36,7 @@ class Scene:
             base.getsockname(),
             60.0,
             (),
+            None,
             False,
         )
         self.ports = Ports(options, folder, link, self.counters)

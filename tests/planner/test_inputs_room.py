@@ -10,6 +10,7 @@ from motion_protocol import Cue, Flags, Motion, encode_cue
 from motionserver.core.state import DriveMode, VehicleMotion
 from motionserver.errors import ConfigError
 from motionserver.planner.inputs import MOST_SENDERS, SHOWN_ERRORS, Input, Inputs, open_input
+from motionserver.planner.inputs import log as room_log
 from motionserver.planner.options import InputOptions
 from motionserver.sources.beamng import BeamNgSource
 from motionserver.sources.udp import DRAIN, UdpInput
@@ -69,7 +70,12 @@ def test_many_senders_cost_no_memory() -> None:
     assert inputs.counters["refused_size"] == 100
 
 
-def test_the_log_tells_the_first_few(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_log_tells_the_first_few(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # whatever another test made of logging in this process
+    monkeypatch.setattr(room_log, "disabled", False)
+    caplog.set_level("WARNING", room_log.name)
     inputs, wire = room()
     wire.waiting = [(b"?", "a:1", k) for k in range(50)]
     inputs.poll()
