@@ -29,6 +29,7 @@ from motionserver.cueing.thondel_qp import Programme
 from motionserver.cueing.thondel_rows import LEG_UNIT
 from motionserver.cueing.tuning import Tuning
 from motionserver.solvers.base import QpResult, QpStatus
+from motionserver.solvers.registry import make_backend
 
 YAW_CORNER: Final = 0.5
 """High-pass of the wanted yaw rate [rad/s]."""
@@ -91,6 +92,7 @@ class Thondel:
             ValueError: As in the constructor; nothing has changed then.
         """
         old = self._tuning
+        self._check(tuning)
         if (old.filters, old.horizon) != (tuning.filters, tuning.horizon):
             filters = filter_set(tuning.filters)
             self._grid = make_grid(tuning.horizon, self._period)
@@ -105,6 +107,14 @@ class Thondel:
             self._halving = make_halving(tuning.halving, self._machine, tuning.box, self._period)
             self._halving.x_max = x_max if tuning.halving != "off" else self._halving.x_max
         self._tuning = tuning
+
+    def _check(self, tuning: Tuning) -> None:
+        """Stumble over words that do not exist before anything is changed."""
+        filter_set(tuning.filters)
+        make_halving(tuning.halving, self._machine, tuning.box, self._period)
+        Reference(tuning.reference, self._period, np.zeros(1), 0.0)
+        if tuning.backend != self._tuning.backend:
+            make_backend(tuning.backend)
 
     def _build(self, tuning: Tuning) -> None:
         """Everything that depends on the grid or the filters."""

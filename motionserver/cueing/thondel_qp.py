@@ -61,10 +61,9 @@ class Programme:
         if shape != self._shape:
             self._backend = make_backend(tuning.backend)
             self._shape = shape
-        self._constant: QpMatrices | None = None
-        if not tuning.legs:
-            sides = [self._box_rows(np.full(len(self._box_slack), s)) for s in (1.0, -1.0)]
-            self._constant = QpMatrices(self._hessian, np.concatenate((self._rows.A, *sides)))
+        # near neutral either end may come first, so both stand
+        sides = [self._box_rows(side) for side in (1.0, -1.0)]
+        self._constant = QpMatrices(self._hessian, np.concatenate((self._rows.A, *sides)))
         self._handed_over = False
 
     def solve(
@@ -93,26 +92,22 @@ class Programme:
         q[: layout.inputs] = self._cost.linear(state, aim, input_aim, last)
         free = self._plant.node_phi @ state + turned
         rates = 1.0 - self._rows.state @ state
-        matrices: QpMatrices | None
-        if self._constant is None:
-            matrices, limits = self._with_legs(free, nominal, x_max)
-            upper = np.concatenate((rates, limits))
-        else:
-            matrices = None if self._handed_over else self._constant
-            share = np.tile(x_max / self._tuning.box, len(free))
-            place = (free / self._tuning.box).ravel()
-            upper = np.concatenate((rates, share - place, share + place))
+        share = np.tile(x_max / self._tuning.box, len(free))
+        place = (free / self._tuning.box).ravel()
+        upper = np.concatenate((rates, share - place, share + place))
+        matrices = None if self._handed_over else self._constant
+        if self._tuning.legs:
+            table, room = self._leg_rows(free, nominal)
+            upper = np.concatenate((upper, room))
+            matrices = QpMatrices(self._hessian, np.concatenate((self._constant.A, table)))
         self._handed_over = True
         lower = np.full(len(upper), -np.inf)
         vectors = QpVectors(q, lower, upper, self._lowest, self._highest)
         return self._backend.solve(vectors, matrices)
 
-    def _with_legs(self, free: Array, nominal: Array, x_max: Array) -> tuple[QpMatrices, Array]:
-        """Box rows of the side the nominal is on, and leg rows about the nominal."""
-        layout, box = self.layout, self._tuning.box
-        side = np.where(nominal >= 0.0, 1.0, -1.0)
-        box_room = (x_max - side * free) / box
-        home = self._machine.parked_pose
+    def _leg_rows(self, free: Array, nominal: Array) -> tuple[Array, Array]:
+        """Rows about the nominal and what they may be, in `LEG_UNIT`."""
+        layout, home = self.layout, self._machine.parked_pose
         legs = leg_rows(self._machine, with_way_home(nominal, home), self._margins)
         table = np.zeros((legs.room.size, layout.size))
         table[:, : layout.inputs] = np.matmul(legs.gradient, self._leg_gamma).reshape(
@@ -120,12 +115,10 @@ class Programme:
         )
         table[:, layout.leg] = -1.0
         room = legs.room - np.einsum("nla,na->nl", legs.gradient, with_way_home(free, home))
-        rows = np.concatenate((self._rows.A, self._box_rows(side.ravel()), table))
-        limits = np.concatenate((box_room.ravel(), room.ravel() / LEG_UNIT))
-        return QpMatrices(self._hessian, rows), limits
+        return table, room.ravel() / LEG_UNIT
 
-    def _box_rows(self, side: Array) -> Array:
-        table = np.zeros((len(side), self.layout.size))
-        table[:, : self.layout.inputs] = side[:, None] * self._rows.box
-        table[np.arange(len(side)), self._box_slack] = -1.0
+    def _box_rows(self, side: float) -> Array:
+        table = np.zeros((len(self._box_slack), self.layout.size))
+        table[:, : self.layout.inputs] = side * self._rows.box
+        table[np.arange(len(table)), self._box_slack] = -1.0
         return table
