@@ -40,6 +40,7 @@ PAPER: Final = Tuning(
     scale=1.0,
     tilt_rate=radians(1000.0),
     filters=FILTERS,
+    reference="constant",
     legs=False,
     halving="off",
     weight_force=1.0 / HARDNESS,
