@@ -35,6 +35,25 @@ class Preview:
 
 
 @dataclass(frozen=True, slots=True)
+class Driver:
+    """What the driver does at the controls.
+
+    Attributes:
+        throttle: 0 released to 1 floored.
+        brake: 0 released to 1 full.
+        clutch: 0 released to 1 pressed.
+        steering: Steering wheel angle, positive to the left [rad].
+        gear: -1 reverse, 0 neutral, 1 first and so on.
+    """
+
+    throttle: float
+    brake: float
+    clutch: float
+    steering: float
+    gear: int
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleMotion:
     """One decoded sample of a simulator, SI and ISO 8855.
 
@@ -49,6 +68,7 @@ class VehicleMotion:
         mode: Driving, paused, teleported or leaving.
         at_platform: True if measured on the platform by an inertial sensor.
         preview: What comes next, if the sender knows.
+        driver: What the driver does, if the sender tells.
     """
 
     arrival_ns: int
@@ -61,6 +81,7 @@ class VehicleMotion:
     mode: DriveMode = DriveMode.DRIVE
     at_platform: bool = False
     preview: Preview | None = None
+    driver: Driver | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +93,19 @@ class Stimulus:
         rates: Wanted body rates, scaled and faded, (3,) [rad/s].
         gain: The fade already contained in both, 0..1 [-].
         preview: Future of the same quantities, times from now; None without preview.
+        share: Factor contained in force and rates, fade times scale [-]; what the vehicle really
+            does is force / share, while share is above 0.
+        speed: Forward speed of the vehicle, not scaled [m/s].
+        driver: What its driver does, not scaled; None if the simulator does not tell.
     """
 
     force: Array
     rates: Array
     gain: float = 1.0
     preview: Preview | None = None
+    share: float = 1.0
+    speed: float = 0.0
+    driver: Driver | None = None
 
 
 @dataclass(frozen=True, slots=True)

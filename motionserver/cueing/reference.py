@@ -5,6 +5,7 @@ Six signals: specific force minus g e_z (3), body rates (3).
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import exp
 from typing import Final
 
@@ -52,11 +53,11 @@ def believable(stimulus: Stimulus) -> Stimulus | None:
         tables = (preview.times, preview.force, preview.rates)
         if not all(np.isfinite(table).all() for table in tables):
             preview = None
-    return Stimulus(
-        np.clip(stimulus.force, -LARGEST_FORCE, LARGEST_FORCE),
-        np.clip(stimulus.rates, -LARGEST_RATE, LARGEST_RATE),
-        stimulus.gain,
-        preview,
+    return replace(
+        stimulus,
+        force=np.clip(stimulus.force, -LARGEST_FORCE, LARGEST_FORCE),
+        rates=np.clip(stimulus.rates, -LARGEST_RATE, LARGEST_RATE),
+        preview=preview,
     )
 
 

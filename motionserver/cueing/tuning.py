@@ -15,7 +15,7 @@ class Tuning:
     """Tunables of all algorithms.
 
     Attributes:
-        algorithm: "classical" or "thondel2014".
+        algorithm: "mpc", "thondel2014" or "classical".
         scale: Share of the vehicle's specific force and rates that is wanted, 0..1 [-].
         gain: Gain of the classical washout on top of the scale, 0..1 [-].
         rotation_gain: Share of the vehicle's own roll and pitch rate that is shown, 0..1 [-].
@@ -33,10 +33,17 @@ class Tuning:
         weight_change: Weight of changing the input.
         weight_position: Weight of being away from neutral.
         filters: Filter set of the washout: "standard" or "fig3".
-        reference: Reference model of surge and sway: "constant", "fade" or "ar".
+        reference: Reference model of surge and sway, see `reference.MODELS`.
         legs: Leg-length rows in the MPC; False is the paper's box-only form.
         halving: "off", "paper" (equations 7 and 8 as printed) or "sound".
-        backend: QP solver: "daqp", "osqp" or "piqp".
+        backend: QP solver, see `solvers.registry.BACKENDS`.
+        predictor: Which fitted predictor the reference "learned" uses.
+        mpc_weight_heave: Weight of the vertical force error, horizontal is 1.
+        mpc_weight_rates: Weight of the body-rate error, per (rad/s)2.
+        mpc_weight_position: Weight of being away from neutral, surge and sway, per m2.
+        mpc_weight_attitude: The same of roll and pitch, per rad2.
+        mpc_weight_tilt_rate: Price of exceeding tilt_rate, in units of it.
+        perception: Weighting of the error: "none", "telban-cardullo" or "reid-nahon".
     """
 
     algorithm: str = "thondel2014"
@@ -60,6 +67,13 @@ class Tuning:
     legs: bool = True
     halving: str = "sound"
     backend: str = "daqp"
+    predictor: str = "truck"
+    mpc_weight_heave: float = 0.3
+    mpc_weight_rates: float = 5.0
+    mpc_weight_position: float = 0.1
+    mpc_weight_attitude: float = 0.05
+    mpc_weight_tilt_rate: float = 2.0
+    perception: str = "none"
 
 
 def blend(old: Tuning, new: Tuning, share: float) -> Tuning:

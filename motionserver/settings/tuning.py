@@ -62,6 +62,10 @@ def _weight(default: float, low: float, high: float, label: str, meaning: str, m
     )
 
 
+def _six(default: float, high: float, label: str, meaning: str, more: str) -> Any:  # noqa: ANN401  (as above)
+    return number(default, 0.0, high, "", group="Six axes", label=label, meaning=meaning, more=more)
+
+
 _START: Final = Tuning()
 """Where the defaults stand; here only those are written again that have other units."""
 
@@ -153,14 +157,47 @@ class TuningModel(BaseModel):
         _START.filters, group="Optimiser", label="Filters",
         meaning="Filter set of the washout; fig3 is that of the paper's figure 3.",
     )
-    reference: Literal["constant", "fade", "ar"] = choice(
+    reference: Literal["constant", "fade", "ar", "vehicle", "learned"] = choice(
         _START.reference, group="Optimiser", label="Reference",
-        meaning="What surge and sway are expected to do next: stay, fade, or follow a fitted "
-        "autoregressive model.",
+        meaning="What surge and sway are expected to do next: stay, fade, follow an "
+        "autoregressive model, follow from pedals and steering, or from recorded drives.",
     )
-    backend: Literal["daqp", "osqp", "piqp"] = choice(
+    backend: Literal["daqp", "osqp", "piqp", "hpipm"] = choice(
         _START.backend, group="Optimiser", label="Solver",
         meaning="Which solver computes the quadratic programme.",
+    )
+    predictor: Literal["truck", "car"] = choice(
+        _START.predictor, group="Optimiser", label="Predictor",
+        meaning="Kind of vehicle whose drives the reference model learned was fitted to.",
+    )
+    mpc_weight_heave: float = _six(
+        _START.mpc_weight_heave, 10.0, "Heave weight",
+        "Price of a wrong vertical force; a horizontal one costs 1.",
+        "closer vertical force, more stroke used for bumps",
+    )
+    mpc_weight_rates: float = _six(
+        _START.mpc_weight_rates, 500.0, "Rate weight",
+        "Price of a wrong turn rate of roll, pitch and yaw.",
+        "closer turning, less tilt for sustained forces",
+    )
+    mpc_weight_position: float = _six(
+        _START.mpc_weight_position, 100.0, "Travel weight",
+        "Price of surge, sway and heave away from neutral.",
+        "sooner back at neutral, weaker onsets",
+    )
+    mpc_weight_attitude: float = _six(
+        _START.mpc_weight_attitude, 100.0, "Attitude weight",
+        "Price of roll, pitch and yaw away from level.",
+        "sooner level, weaker sustained forces",
+    )
+    mpc_weight_tilt_rate: float = _six(
+        _START.mpc_weight_tilt_rate, 100.0, "Tilt rate weight",
+        "Price of tilting faster than the tilt rate.",
+        "tilting stays below the threshold, sustained forces arrive later",
+    )
+    perception: Literal["none", "telban-cardullo", "reid-nahon"] = choice(
+        _START.perception, group="Six axes", label="Perception",
+        meaning="Judge the error as the inner ear would: not at all, or with one of two models.",
     )
     # fmt: on
 

@@ -7,7 +7,7 @@ from motion_protocol import Cue, Flags, ProtocolError, decode_cue
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.kinematics.rotation import gravity_in_body
-from motionserver.core.state import DriveMode, Preview, VehicleMotion
+from motionserver.core.state import DriveMode, Driver, Preview, VehicleMotion
 from motionserver.sources.base import SourceError
 
 LEVEL = frozen(gravity_in_body(np.array(0.0), np.array(0.0)))
@@ -44,6 +44,7 @@ class NativeSource:
             mode=DriveMode(int(cue.mode)),
             at_platform=bool(cue.flags & Flags.MEASURED_AT_PLATFORM),
             preview=_preview(cue, gravity),
+            driver=_driver(cue),
         )
 
 
@@ -63,3 +64,10 @@ def _preview(cue: Cue, gravity: Array) -> Preview | None:
     samples = np.array(cue.preview.samples)
     times = cue.preview.start + cue.preview.dt * np.arange(len(samples))
     return Preview(frozen(times), frozen(samples[:, :3] + gravity), frozen(samples[:, 3:]))
+
+
+def _driver(cue: Cue) -> Driver | None:
+    told = cue.driver
+    if told is None:
+        return None
+    return Driver(told.throttle, told.brake, told.clutch, told.steering, told.gear)

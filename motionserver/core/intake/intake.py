@@ -104,6 +104,9 @@ class Intake:
             frozen(share * self._rates),
             self.gain,
             None if self._blanked else _scaled(motion.preview, head, share),
+            share,
+            motion.speed,
+            motion.driver,
         )
 
     def _spin_of(self, motion: VehicleMotion, period: float) -> Array:
