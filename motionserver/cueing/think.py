@@ -40,18 +40,45 @@ class Thought:
 class Thinker:
     """The driving algorithm with its tuning, behind the governor."""
 
-    def __init__(self, machine: Machine, tuning: Tuning, period: float, homes: Array) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        tuning: Tuning,
+        period: float,
+        homes: Array,
+        cueing: Cueing | None = None,
+    ) -> None:
         self.machine = machine
         self.tuning = tuning
         self.period = period
-        self.cueing: Cueing = make_cueing(machine, tuning, period)
+        self.cueing: Cueing = cueing or make_cueing(machine, tuning, period)
         self._homes = homes
         self._from = tuning
         self._target = tuning
         self._share = 1.0
 
-    def retune(self, target: Tuning) -> None:
-        """Go to another tuning within `RAMP` seconds; another algorithm takes over at once."""
+    def retune(self, target: Tuning, warm: Cueing | None = None) -> None:
+        """Go to another tuning within `RAMP` seconds; another algorithm takes over at once.
+
+        Whatever takes over continues the accepted plan, so the platform notices nothing but that
+        it is cued in another way.
+
+        Args:
+            target: Where to go.
+            warm: The algorithm that ``target`` names, with all it has learnt beside the driving
+                one; a fresh one is made if None.
+
+        Raises:
+            ValueError: The algorithm cannot be made; then nothing has changed.
+        """
+        if target.algorithm != self.tuning.algorithm:
+            now = blend(self.tuning, target, 0.0)
+            if warm is None:
+                self.cueing = make_cueing(self.machine, now, self.period)
+            else:
+                warm.retune(now)
+                self.cueing = warm
+            self.tuning = now
         self._from, self._target, self._share = self.tuning, target, 0.0
 
     def think(
@@ -103,10 +130,7 @@ class Thinker:
         tuning = (
             self._target if self._share >= 1.0 else blend(self._from, self._target, self._share)
         )
-        if tuning.algorithm != self.tuning.algorithm:
-            self.cueing = make_cueing(self.machine, tuning, self.period)
-        else:
-            self.cueing.retune(tuning)
+        self.cueing.retune(tuning)
         self.tuning = tuning
 
     def _no_report(self) -> Report:

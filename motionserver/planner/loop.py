@@ -7,7 +7,7 @@ import gc
 import logging
 import signal
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from motion_protocol import PlatformState as WireState
@@ -22,10 +22,12 @@ from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import STILL, Stimulus, VehicleMotion
 from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
+from motionserver.cueing.tuning import Tuning
 from motionserver.planner.handover import Handover, HandoverClock
 from motionserver.planner.inputs import Inputs, open_input
 from motionserver.planner.options import PlannerOptions
 from motionserver.planner.show import PlannerView, Timing
+from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.link import STATES, Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
@@ -51,6 +53,7 @@ class PlannerLoop:
         self._tuner = Tuner(options)
         homes = frozen(np.stack((np.zeros(6), options.machine.parked_pose)))
         self._thinker = Thinker(options.machine, self._tuner.tuning(), options.period, homes)
+        self._sides = Sides(options.machine, options.period, homes, self._tuner.side)
         self._clock = HandoverClock(self._maps, options.send_period)
         self._state: State | None = None
         self._inputs = Inputs(
@@ -134,13 +137,28 @@ class PlannerLoop:
         handover = self._clock.handover(now, self._timing.expected_ns)
         if handover is not None:
             self._think(now, handover, stimulus, sensor)
-        self._serve()
+        self._serve(handover)
         self._status(now)
+        self._sides.make_one(self._thinker.tuning)
+        if handover is not None:
+            self._sides.think(stimulus, self._due_ns + int(self.options.period * SECOND))
+        elif self._state not in CUED:
+            self._sides.stand()
+        self._show(now, stimulus)
+
+    def _show(self, now: int, stimulus: Stimulus) -> None:
+        self._maps.trace.write(self._view.trace(now, stimulus, self._thinker, self._sides))
         if now - self._snapshot_ns > SNAPSHOT_NS:
             self._snapshot_ns = now
             self._maps.planner.write(
                 self._view.snapshot(
-                    now, self._thinker, self._inputs, self._timing, self._tuner, self._measured
+                    now,
+                    self._thinker,
+                    self._inputs,
+                    self._timing,
+                    self._tuner,
+                    self._measured,
+                    self._sides,
                 )
             )
 
@@ -151,14 +169,19 @@ class PlannerLoop:
         model = self._felt(handover)
         self._compare(now, sensor, model)
         self._thinker.cueing.disturbance = self._measured.disturbance
+        begun = now_ns()
         thought: Thought = self._thinker.think(
             parent, handover.before, handover.takeover, stimulus, now
         )
+        took = now_ns() - begun
         if thought.proposal is not None:
             self._maps.proposal.write(pack(thought.proposal.plan))
             self._clock.proposed(thought.proposal.plan)
         self._timing.thought(now_ns() - now)
-        self._view.note(thought, stimulus, model - UP)
+        scores, proposal = self._sides.driving, thought.proposal
+        scores.heard(parent, handover.takeover, stimulus)
+        scores.thought(None if proposal is None else proposal.kappa, took / SECOND)
+        self._view.note(thought, stimulus, model - UP, self._thinker.tuning.algorithm)
 
     def _felt(self, handover: Handover) -> Array:
         """What the person feels about now, gravity included, (3,) [m/s2]."""
@@ -175,12 +198,33 @@ class PlannerLoop:
         elif now - self._measured_ns > SECOND // 5:
             self._measured.lost()
 
-    def _serve(self) -> None:
+    def _serve(self, handover: Handover | None) -> None:
         for message, address in self._requests.poll():
-            answer, tuning = self._tuner.serve(message)
-            if tuning is not None:
-                self._thinker.retune(tuning)
+            if message["op"] == "side":
+                answer, names = self._tuner.serve_side(message)
+                if names is not None:
+                    self._sides.want(names)
+            else:
+                answer, tuning = self._tuner.serve(message)
+                if tuning is not None:
+                    answer = self._retune(tuning, handover) or answer
             self._requests.answer(address, answer)
+
+    def _retune(self, tuning: Tuning, handover: Handover | None) -> dict[str, Any] | None:
+        """Take another tuning; the refusal if it names what cannot be made."""
+        former, cueing = self._thinker.tuning.algorithm, self._thinker.cueing
+        try:
+            self._thinker.retune(tuning, self._sides.warm(tuning.algorithm))
+        except Exception as error:
+            return self._tuner.take_back(f"{tuning.algorithm} cannot be made: {error}")
+        if tuning.algorithm == former:
+            self._sides.retune(tuning)
+        else:
+            log.info("%s takes over from %s", tuning.algorithm, former)
+            where = (None, 0.0) if handover is None else (handover.parent, handover.takeover)
+            self._sides.switched(tuning, former, cueing, *where)
+            self._tuner.keep_side(self._sides.wanted)
+        return None
 
     def _status(self, now: int) -> None:
         """Answer the owner ten times a second, with its own time echoed."""

@@ -46,6 +46,7 @@ class PlannerOptions:
         tuning: Tunables at the start, in the units of the page.
         tuning_file: Where the tuning in force survives a restart of the planner.
         realtime: True: ask for real-time scheduling.
+        side_engines: Algorithms that run beside the driving one at the start.
     """
 
     machine: Machine
@@ -57,6 +58,7 @@ class PlannerOptions:
     tuning: dict[str, Any]
     tuning_file: Path
     realtime: bool
+    side_engines: tuple[str, ...] = ()
 
 
 def read_options(run_dir: Path) -> PlannerOptions:
@@ -84,4 +86,5 @@ def read_options(run_dir: Path) -> PlannerOptions:
         tuning=planner["tuning"],
         tuning_file=run_dir / "tuning.json",
         realtime=data["realtime"],
+        side_engines=tuple(planner["side_engines"]),
     )

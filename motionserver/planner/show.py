@@ -14,8 +14,10 @@ from motionserver.core.state import STILL, Stimulus
 from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
 from motionserver.planner.inputs import Inputs
+from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.ticker import Lateness
+from motionserver.telemetry.trace import Trace
 
 GUESS_NS: Final = 5_000_000
 
@@ -68,16 +70,31 @@ class PlannerView:
         self._last_count = (0, 0)
         self._rate = 0.0
 
-    def note(self, thought: Thought, stimulus: Stimulus, felt_force: Array) -> None:
-        """Take the last period's outcome."""
+    def note(self, thought: Thought, stimulus: Stimulus, felt_force: Array, algorithm: str) -> None:
+        """Take the last period's outcome, of the algorithm that drove it."""
         self._thought, self._stimulus, self._felt = thought, stimulus, felt_force
         self._counters["plans_thought"] += 1
+        self._counters[f"plans_thought_{algorithm}"] += 1
         if thought.proposal is None:
             self._counters["no_plan"] += 1
+            self._counters[f"no_plan_{algorithm}"] += 1
         elif thought.proposal.kappa == 0.0:
             self._counters["plans_refused"] += 1
+            self._counters[f"plans_refused_{algorithm}"] += 1
         elif thought.proposal.kappa < 1.0:
             self._counters["plans_halved"] += 1
+
+    def trace(self, now_ns: int, stimulus: Stimulus, thinker: Thinker, sides: Sides) -> bytes:
+        """What a recorder keeps of every period; see `telemetry.trace`."""
+        proposal = None if self._thought is None else self._thought.proposal
+        return Trace(
+            now_ns,
+            thinker.tuning.algorithm,
+            None if proposal is None else proposal.kappa,
+            tuple(stimulus.force.tolist()),
+            tuple(self._felt.tolist()),
+            {name: (*force.tolist(), kappa) for name, (force, kappa) in sides.forces().items()},
+        ).pack()
 
     def snapshot(
         self,
@@ -87,6 +104,7 @@ class PlannerView:
         timing: Timing,
         tuner: Tuner,
         measured: MeasuredForce,
+        sides: Sides,
     ) -> bytes:
         """Write everything as JSON."""
         thought, gate = self._thought, inputs.vehicle
@@ -133,7 +151,13 @@ class PlannerView:
             "kappa": None if proposal is None else proposal.kappa,
             "trouble": "" if thought is None else thought.trouble[:300],
             "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],
-            "counters": {**inputs.counters, **self._counters, "lost_packets": gate.lost},
+            "counters": {
+                **inputs.counters,
+                **self._counters,
+                "lost_packets": gate.lost,
+                "switches": sides.switches,
+            },
+            "side": sides.shown(thinker.tuning.algorithm),
             "tuning": tuner.shown(),
             "tick": timing.lateness.summary(),
             "rates_hz": {"planner": round(self._rate, 2)},

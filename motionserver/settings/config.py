@@ -92,6 +92,12 @@ class CueingSection(Strict):
     tuning: dict[str, Any] = Field(default_factory=dict)
 
 
+class PlannerSection(Strict):
+    """[planner]: what runs beside the driving algorithm."""
+
+    side_engines: list[str] = Field(default_factory=list)
+
+
 class OperatorSection(Strict):
     """[operator]: who may engage."""
 
@@ -125,6 +131,7 @@ class Config(BaseSettings):
     platform: PlatformSection = Field(default_factory=PlatformSection)
     sources: list[SourceSection] = Field(default_factory=lambda: [SourceSection()])
     cueing: CueingSection = Field(default_factory=CueingSection)
+    planner: PlannerSection = Field(default_factory=PlannerSection)
     operator: OperatorSection = Field(default_factory=OperatorSection)
     web: WebSection = Field(default_factory=WebSection)
 

@@ -17,6 +17,7 @@ from motionserver.platforms.registry import make_platform
 from motionserver.settings.config import Config, SourceSection, split_address, state_dir_of
 from motionserver.settings.fields import TuningError
 from motionserver.settings.machine import load_machine, unchecked_limits
+from motionserver.settings.side_engines import side_names
 from motionserver.settings.tuning import apply_changes, default_for
 
 SHORTEST_KEY = 16
@@ -60,6 +61,14 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         apply_changes(default_for(machine), tuning).check_machine(machine)
     except TuningError as error:
         raise ConfigError("[cueing.tuning]", str(error), "Correct this value.") from error
+    try:
+        side = side_names(config.planner.side_engines)
+    except TuningError as error:
+        raise ConfigError(
+            "[planner] side_engines",
+            "; ".join(f"{e.value!r}: {e.message}" for e in error.errors),
+            f"Allowed: {error.errors[0].allowed}.",
+        ) from error
     per_plan = ceil(platform.rate_hz / cueing.rate_max_hz)
     return {
         "machine": machine_to_mapping(machine),
@@ -80,6 +89,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             "budget": min(cueing.budget_ms * 1e-3, 0.8 * per_plan / platform.rate_hz),
             "arm": list(cueing.vehicle_head_m),
             "tuning": tuning,
+            "side_engines": list(side),
         },
         "sources": [_source(one) for one in config.sources],
         "web": _web(config, run_dir, machine_to_mapping(machine)),

@@ -37,6 +37,7 @@ class TuningBook:
         self._now = now
         self._model = model if model is not None else default_for(machine)
         self._model.check_machine(machine)
+        self._replaced = self._model
         self._former: deque[TuningModel] = deque(maxlen=KEPT)
         self._changed: deque[float] = deque(maxlen=CHANGES_PER_SECOND)
         self.version = 1
@@ -75,6 +76,21 @@ class TuningBook:
         if not isinstance(changes, dict) or not all(isinstance(name, str) for name in changes):
             return self._refused("invalid", "changes must be a mapping of names to values")
         return self._tune(changes)
+
+    def take_back(self, why: str) -> dict[str, Any]:
+        """Put the tuning in force before the last change back: the last one cannot be used.
+
+        Args:
+            why: What stands in the way.
+
+        Returns:
+            The refusal to answer with.
+        """
+        if self._former and self._former[-1] == self._replaced:
+            self._former.pop()
+        self._model = self._replaced
+        self.version += 1
+        return self._refused("invalid", why)
 
     def to_mapping(self) -> dict[str, Any]:
         """Version, values and history as plain values, to be kept over a restart."""
@@ -128,7 +144,7 @@ class TuningBook:
 
     def _put(self, model: TuningModel) -> dict[str, Any]:
         self._changed.append(self._now())
-        self._model = model
+        self._replaced, self._model = self._model, model
         self.version += 1
         return self._accepted()
 

@@ -12,6 +12,7 @@ from motionserver.core.safety.states import State
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.trace import TRACE_BYTES
 
 STATES: Final = tuple(State)
 _CLOCK: Final = struct.Struct("<BQdQQQ")
@@ -76,6 +77,7 @@ class Maps:
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
+        trace: Planner to a recorder: `trace.Trace`, every period.
     """
 
     def __init__(self, run_dir: Path, create: bool = False) -> None:
@@ -89,3 +91,4 @@ class Maps:
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)
+        self.trace = opened("trace", TRACE_BYTES)
