@@ -5,6 +5,7 @@ MotionServerError
     PluginError                a plug-in that does not load
     PlatformPacketError        bytes on the platform's port that are no answer (platforms.base)
     SourceError                bytes of a simulator that are no sample (sources.base)
+    RecordError                a recording that cannot be written or read (telemetry.recorded)
     RecordingError             a recording that cannot be read (evaluate.recording)
 """
 

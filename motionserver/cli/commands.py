@@ -87,6 +87,22 @@ def status(
     typer.echo(status_text(config, as_json))
 
 
+@app.command()
+def record(
+    config: MaybeConfig = None,
+    out: Annotated[Path, typer.Option("--out", help="a new file", metavar="FILE.csv")] = Path(
+        "drive.csv"
+    ),
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
+    ] = None,
+) -> None:
+    """Write what a running server does, one row per packet, without touching it."""
+    from motionserver.cli.recording import record as record_drive
+
+    typer.echo(record_drive(config, out, seconds))
+
+
 def _ask(op: str, config: Path | None) -> None:
     from motionserver.cli.serving import ask_guard
 

@@ -20,6 +20,7 @@ from motionserver.web.gate import Gate
 from motionserver.web.metrics import registry_for, text_of
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import Ask, Peer, guard_refusal
+from motionserver.web.side_routes import side_routes
 from motionserver.web.snapshot import SnapshotSource, StatusBoard
 from motionserver.web.stream import Streams
 from motionserver.web.tuning_routes import tuning_routes
@@ -63,6 +64,7 @@ def build_app(
     _reading_routes(app, desk, board, answered)
     _motion_routes(app, desk)
     app.include_router(tuning_routes(desk))
+    app.include_router(side_routes(desk))
     app.mount("/static", StaticFiles(directory=_STATIC), name="static")
     _error_answers(app)
     app.add_middleware(Gate, host_names=config.host_names, answered=answered)

@@ -25,6 +25,12 @@ _SINGLES: Final = (
     ("planner", ("tuning", "version"), "tuning_version", "Version of the tuning in force."),
     ("planner", ("solver", "iterations"), "solver_iterations", "Iterations of the last step."),
 )
+_ENGINE: Final = (
+    ("nrmse", "nrmse", "Error of the felt force over the wanted one, last half minute."),
+    ("kappa_refused", "refused_share", "Share of periods in which nothing passed."),
+    ("think_p99_ms", "think_p99_milliseconds", "Time to think."),
+    ("skipped", "skipped_periods", "Periods without time to think."),
+)
 
 
 class StatusCollector(Collector):
@@ -54,6 +60,7 @@ class StatusCollector(Collector):
             yield _gauge(f"{name}_rate_hertz", f"Rates of the {name}.", "loop", rates)
         yield from _lists(guard, planner)
         yield from _quantiles(guard, planner)
+        yield from _engines(planner.get("side"))
         for process, path, name, text in _SINGLES:
             value = _at(guard if process == "guard" else planner, path)
             if value is not None:
@@ -103,6 +110,17 @@ def _quantiles(guard: Mapping[str, Any], planner: Mapping[str, Any]) -> Iterator
     took = {q: solver[k] / 1e3 for q, k in (("0.5", "time_p50_ms"), ("0.99", "time_p99_ms"))
             if k in solver}  # fmt: skip
     yield _gauge("solver_time_seconds", "Time of one planning step.", "quantile", took)
+
+
+def _engines(side: object) -> Iterator[Metric]:
+    """Figures of the driving engine and of those beside it, by the name of the algorithm."""
+    found = side if isinstance(side, dict) else {}
+    engines = [found.get("driving"), *(found.get("engines") or ())]
+    named = {str(e["name"]): e for e in engines if isinstance(e, dict) and "name" in e}
+    for key, name, text in _ENGINE:
+        values = {engine: _at(figures, (key,)) for engine, figures in named.items()}
+        yield _gauge(f"engine_{name}", text, "engine",
+                     {e: v for e, v in values.items() if v is not None})  # fmt: skip
 
 
 def _gauge(name: str, text: str, label: str, values: Mapping[str, float]) -> Metric:

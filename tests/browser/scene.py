@@ -16,6 +16,7 @@ from motionserver.core.axes import frozen
 from motionserver.core.kinematics.hexapod import leg_motion
 from motionserver.core.kinematics.rotation import felt
 from motionserver.core.limits import Machine, Pace, machine_to_mapping
+from motionserver.settings.fields import algorithms
 from motionserver.settings.tuning_book import TuningBook
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.requests import RequestServer
@@ -56,6 +57,7 @@ class Scene:
     def __init__(self, machine):
         self.machine = machine
         self.book = TuningBook(machine, time.monotonic)
+        self.beside = ["classical"]
         self.state, self.reason = "PARKED", "parked; engage to raise"
         self.since = time.monotonic()
         self.started = self.since
@@ -79,6 +81,29 @@ class Scene:
             reason = f"{op} is not possible in {self.state}"
             return {"ok": False, "state": self.state, "reason": reason}
         return {"ok": True, "state": self.state, "reason": self.reason}
+
+    def answer_planner(self, request):
+        if request["op"] != "side":
+            return self.book.answer(request)
+        self.beside = request.get("engines", self.beside)
+        return {"ok": True, "engines": self.beside, "allowed": list(algorithms())}
+
+    def side(self, force):
+        def engine(name, felt, nrmse, think, part):
+            return {"name": name, "felt_force": felt.tolist(), "rest_pose": [0.0] * 6,
+                    "periods_judged": 1800, "rmse": 0.4 * nrmse, "nrmse": nrmse, "kappa": 1.0,
+                    "kappa_whole": 1 - part, "kappa_part": 0.8 * part,
+                    "kappa_refused": 0.2 * part, "no_candidate": 0.0, "think_p50_ms": think,
+                    "think_p99_ms": 1.6 * think, "leg_use": 0.7, "trouble": "", "periods": 9000,
+                    "skipped": 0, "raised": 0}  # fmt: skip
+
+        made = {"thondel2014": (1.0, 0.412, 2.7, 0.012), "classical": (0.72, 0.594, 1.4, 0.083)}
+        drives = self.book.model.algorithm
+        shown = {n: engine(n, force * k, *rest) for n, (k, *rest) in made.items()}
+        for name in algorithms():
+            shown.setdefault(name, engine(name, 1.1 * force, 0.31, 4.6, 0.001))
+        beside = [shown[name] for name in self.beside if name != drives]
+        return {"wanted": self.beside, "driving": shown[drives], "engines": beside, "switches": 0}
 
     def advance(self):
         age = time.monotonic() - self.since
@@ -185,6 +210,7 @@ class Scene:
             "disturbance": [0.0, 0.0, 0.0],
             "rates_hz": {"planner": 100.0},
             "tracking": {"mismatch": 0.061, "alarm": False}, "trouble": "",
+            "side": self.side(force),
         }  # fmt: skip
 
     def service(self):
@@ -236,7 +262,7 @@ class Peers:
                 self._guard.write(json.dumps(scene.guard()).encode())
             if "planner" not in scene.dead:
                 for request, address in self._planner_requests.poll():
-                    self._planner_requests.answer(address, scene.book.answer(request))
+                    self._planner_requests.answer(address, scene.answer_planner(request))
                 self._planner.write(json.dumps(scene.planner()).encode())
 
 

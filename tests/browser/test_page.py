@@ -190,6 +190,31 @@ def test_presets_are_saved_loaded_and_applied(site, visit):
     assert site.scene.book.model.filters == "standard"
 
 
+def test_another_engine_is_run_beside_and_takes_over(site, visit):
+    one = visit()
+    row = "#engines .engine:has(b:text-is('{}'))"
+    drive, run = (row.format("classical") + f" .acts button:nth-child({n})" for n in (1, 2))
+    one.expect("#side-keys", "classical")
+    assert one.page.is_disabled(drive)
+    one.identify("tuner")
+    one.page.wait_for_selector(f"{drive}:enabled")
+    assert one.page.is_disabled(run)
+    one.identify("operator")
+    one.page.click(f"{run}:enabled")
+    one.expect("#engines-answer", "classical stopped")
+    assert site.scene.beside == []
+    one.page.wait_for_function("() => !document.querySelector('#side-keys').textContent")
+    one.page.click(f"{run}:enabled")
+    one.expect("#engines-answer", "classical runs beside")
+    one.page.fill("#tune-scale", "0.4")
+    one.page.click(f"{drive}:enabled")
+    one.page.wait_for_selector("#engines .drives b:text-is('classical')")
+    assert site.scene.book.model.algorithm == one.value("algorithm") == "classical"
+    assert site.scene.book.model.scale == 0.6
+    one.expect("#apply", "Apply 1 change")
+    one.page.wait_for_selector(row.format("thondel2014") + " button:text-is('Run beside')")
+
+
 def test_silence_is_said_and_ends_by_itself(site, visit):
     one = visit()
     one.expect("#link", "live")

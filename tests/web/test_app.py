@@ -55,7 +55,7 @@ class World:
             Newest(self.scene.planner),
             Newest(self.scene.service),
             self.ask(self.scene.answer_guard),
-            self.ask(lambda request: self.scene.book.answer(request)),
+            self.ask(lambda request: self.scene.answer_planner(request)),
         )
 
     def now(self):
@@ -90,10 +90,14 @@ def assert_explained(answer):
 
 # Who may do what ------------------------------------------------------------------------------
 
-READING = ["/metrics", "/api/status", "/api/tuning", "/api/presets", "/api/presets/gentle"]
+READING = [
+    *("/metrics", "/api/status", "/api/side"),
+    *("/api/tuning", "/api/presets", "/api/presets/gentle"),
+]
 CHANGING = [
     ("PATCH", "/api/tuning", "tuner"),
     ("POST", "/api/tuning/undo", "tuner"),
+    ("POST", "/api/side", "operator"),
     ("PUT", "/api/presets/mine", "tuner"),
     ("POST", "/api/engage", "operator"),
     ("POST", "/api/park", "viewer"),
@@ -472,3 +476,48 @@ def test_hostile_text_of_the_device_stays_text(world):
     assert answer.headers["content-type"] == "application/json"
     assert answer.text.isascii()
     assert answer.json()["reason"] == hostile
+
+
+# Side engines ---------------------------------------------------------------------------------
+
+
+def test_side_engines_are_read_and_changed_and_written_down(world):
+    answer = world.client().get("/api/side")
+    assert answer.json()["engines"] == ["classical"]
+    assert {"classical", "thondel2014"} <= set(answer.json()["allowed"])
+    names = ["thondel2014", "classical"]
+    answer = world.client("operator").post("/api/side", json={"engines": names})
+    assert (answer.status_code, answer.json()["engines"]) == (200, names)
+    assert world.asked[-1] == {"op": "side", "engines": names}
+    noted = json.loads((world.config.run_dir / "audit.jsonl").read_text().splitlines()[-1])
+    assert (noted["action"], noted["result"], noted["engines"]) == ("side", "done", names)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {},
+        {"engines": "classical"},
+        {"engines": ["magic"]},
+        {"engines": ["classical", "classical"]},
+        {"engines": [7, None, {}]},
+        {"engines": [], "more": 1},
+    ],
+)
+def test_side_engines_that_are_not_allowed_are_explained(world, body):
+    answer = world.client("operator").post("/api/side", json=body)
+    assert answer.status_code == 422
+    assert_explained(answer)
+    assert "classical" in answer.json()["allowed"] + answer.json()["do"]
+    assert world.asked == []
+
+
+def test_metrics_compare_the_engines(world):
+    text = world.client().get("/metrics").text
+    values = {
+        sample.labels["engine"]: sample.value
+        for family in text_string_to_metric_families(text)
+        for sample in family.samples
+        if sample.name == "motionserver_engine_nrmse"
+    }
+    assert values == {"thondel2014": 0.412, "classical": 0.594}

@@ -1,6 +1,7 @@
 // Brings stream, drawings and forms together.
 import { send, sentence, setToken, token } from "./api.js";
 import { byId, put } from "./dom.js";
+import { Engines } from "./engines.js";
 import { Hexapod } from "./hexapod.js";
 import { Legs } from "./legs.js";
 import { duration, showLog, showNumbers, showState } from "./panels.js";
@@ -13,6 +14,8 @@ const hexapod = new Hexapod(byId("hexapod"));
 const legs = new Legs();
 const plots = new Plots();
 const tuning = new Tuning();
+const engines = new Engines();
+engines.onDrive = (name) => tuning.driveWith(name);
 let status = null;
 let arrived = 0;
 let link = "connecting";
@@ -76,8 +79,10 @@ async function identify() {
   byId("role").className = `pill ${wrong ? "bad" : caller.hasToken ? "good" : ""}`;
   put(byId("role"), wrong ? "unknown token" : caller.role);
   tuning.mayTune = caller.hasToken && caller.role !== "viewer";
+  engines.mayTune = tuning.mayTune;
+  engines.mayRun = caller.role === "operator";
   tuning.refresh();
-  if (!wrong) await tuning.load();
+  if (!wrong) await Promise.all([tuning.load(), engines.load()]);
 }
 
 byId("token-form").addEventListener("submit", (event) => {
@@ -96,6 +101,8 @@ function render() {
   legs.show(status.guard);
   showNumbers(status);
   showLog(status);
+  engines.show(status);
+  plots.beside(engines.lines(status), (name) => engines.colour(name));
   plots.draw();
   tuning.noticed(status.planner?.tuning?.version);
   hexapod.status = status;

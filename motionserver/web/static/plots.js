@@ -49,10 +49,27 @@ export class Plots {
     const felt = { stroke: "#56b4e9", width: 2.2 };
     const measured = { stroke: "#e69f00", width: 1.3, dash: [2, 3] };
     this.forces = FORCE.map((_, i) => new Plot(byId("forces"), 118, [wanted, measured, felt], { range: symmetric(1), lastRow: i === 2 }));
+    this.sides = [];
     const edge = { stroke: "#35c9a3", width: 1.4 };
     const box = { stroke: "#8fa1b3", width: 1.2, dash: [5, 4] };
     this.axes = POSE.map((p, i) => new Plot(byId("xmax"), 104, [edge, edge, box, box, felt],
       { bands: [{ series: [1, 2], fill: "rgba(53,201,163,.13)" }], range: symmetric(1), lastRow: i > 3, size: 40 }));
+  }
+
+  // Thin lines of the engines beside; a plot's series are changed only when the engines are.
+  beside(names, colour) {
+    if (names.join() === this.sides.join()) return;
+    for (const { plot } of this.forces) {
+      plot.setData([[], [], [], []], false);
+      while (plot.series.length > 4) plot.delSeries(plot.series.length - 1);
+      for (const name of names) plot.addSeries({ stroke: colour(name), width: 1, points: { show: false }, spanGaps: false });
+    }
+    this.sides = [...names];
+    byId("side-keys").replaceChildren(...names.map((name) => {
+      const key = make("span", "key side", name);
+      key.style.setProperty("--line-colour", colour(name));
+      return key;
+    }));
   }
 
   add(status) {
@@ -64,6 +81,7 @@ export class Plots {
     const three = (values) => [0, 1, 2].map((i) => (isNumber(list(values)[i]) ? values[i] : null));
     this.rows.push({
       time, wanted: three(planner.wanted_force), felt: three(planner.felt_force), measured: three(planner.measured_force),
+      sides: new Map(list(planner.side?.engines).map((engine) => [engine.name, three(engine.felt_force)])),
       x_max: list(planner.x_max), pose: list(guard.pose), box: list(status.machine?.box),
     });
     while (this.rows.length && this.rows[0].time < time - SPAN - 1) this.rows.shift();
@@ -76,7 +94,8 @@ export class Plots {
     const times = rows.map((r) => r.time - now);
     const last = rows.at(-1);
     this.forces.forEach((plot, i) => {
-      plot.plot.setData([times, rows.map((r) => r.wanted[i]), rows.map((r) => r.measured[i]), rows.map((r) => r.felt[i])]);
+      plot.plot.setData([times, rows.map((r) => r.wanted[i]), rows.map((r) => r.measured[i]), rows.map((r) => r.felt[i]),
+        ...this.sides.map((name) => rows.map((r) => r.sides.get(name)?.[i] ?? null))]);
       caption(plot.title, FORCE[i], `felt ${fixed(last.felt[i], 2)}, wanted ${fixed(last.wanted[i], 2)} m/s²`);
     });
     this.axes.forEach((plot, i) => {

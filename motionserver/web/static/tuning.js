@@ -2,7 +2,7 @@
 import { send, sentence } from "./api.js";
 import { byId, make, put } from "./dom.js";
 
-const ORDER = ["Feel", "Perception", "Workspace", "Optimiser"];
+const ORDER = ["Feel", "Perception", "Workspace", "Optimiser", "Six axes"];
 const LASTING = 6; // looks, ten a second
 const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
@@ -156,6 +156,21 @@ export class Tuning {
   apply() {
     return this.change("PATCH", "/api/tuning", { body: this.changes(), ifMatch: this.version },
       (body) => `Applied as version ${body.version}; takes full effect within a second.`);
+  }
+
+  // Another algorithm takes over; what is pending in the form stays pending.
+  async driveWith(name) {
+    const options = { body: { algorithm: name }, ifMatch: this.version };
+    let answer = await send("PATCH", "/api/tuning", options);
+    if (answer.status === 412 && answer.body.version) answer = await send("PATCH", "/api/tuning", { ...options, ifMatch: answer.body.version });
+    if (!answer.ok) return answer;
+    if (Object.keys(this.changes()).length === 0) this.take(answer.body);
+    else {
+      Object.assign(this, { version: answer.body.version, values: answer.body.values });
+      this.rows.get("algorithm").input.value = name;
+      this.refresh();
+    }
+    return `${name} drives.`;
   }
 
   undo() {

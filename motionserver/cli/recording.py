@@ -1,0 +1,64 @@
+"""record: a process of its own that reads what the others show."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+from motionserver.cli.serving import NotRunningError
+from motionserver.core.limits import machine_from_mapping
+from motionserver.cueing.registry import algorithms
+from motionserver.errors import ConfigError
+from motionserver.settings.config import load_config, run_dir_of
+from motionserver.telemetry.link import GuardClock, Maps
+from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
+from motionserver.telemetry.ticker import now_ns
+
+_POLITE = 10
+"""Nice value: whatever is recorded comes first."""
+
+
+def record(path: Path | None, out: Path, seconds: float | None) -> str:
+    """Record a running server until Ctrl-C, SIGTERM, its end, or for ``seconds`` [s].
+
+    Returns:
+        What was written, in words.
+
+    Raises:
+        NotRunningError: No server runs with this configuration.
+        RecordError: The file cannot be written.
+    """
+    if seconds is not None and not seconds > 0.0:
+        raise ConfigError("--seconds", f"{seconds:g}", "Give a positive number.")
+    run_dir = run_dir_of(load_config(path))
+    try:
+        maps = Maps(run_dir)
+        shown = json.loads((run_dir / "config.json").read_text("utf-8"))
+        clock = maps.clock.read()
+    except (OSError, ValueError) as error:
+        raise NotRunningError(f"record: no server runs in {run_dir} ({error})") from error
+    if clock is None or now_ns() - GuardClock.unpack(clock[1]).written_ns > SILENT_NS:
+        raise NotRunningError(f"record: no server runs in {run_dir}; its guard says nothing")
+    over = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: over.set())
+    with contextlib.suppress(OSError):
+        os.nice(_POLITE)
+    names = algorithms()
+    recorder = Recorder(maps, machine_from_mapping(shown["machine"]), names)
+    begun = time.monotonic()
+
+    def is_over() -> bool:
+        late = seconds is not None and time.monotonic() - begun >= seconds
+        return late or over.is_set()
+
+    why = write_recording(
+        recorder, names, out, now_ns=now_ns, pause=lambda s: time.sleep(s), is_over=is_over
+    )
+    took = time.monotonic() - begun
+    return f"{recorder.rows} rows in {took:.1f} s to {out}; {why}"
