@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from motion_protocol import PlatformState as WireState
-from motion_protocol import Status, encode_status
+from motion_protocol import encode_status
 
 from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.intake.intake import Head, Intake
@@ -26,10 +25,11 @@ from motionserver.cueing.tuning import Tuning
 from motionserver.planner.handover import Handover, HandoverClock
 from motionserver.planner.inputs import Inputs, open_input
 from motionserver.planner.options import PlannerOptions
+from motionserver.planner.reply import status_packet
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
-from motionserver.telemetry.link import STATES, Maps, pack_cue
+from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
@@ -236,24 +236,7 @@ class PlannerLoop:
             return
         self._status_ns = now
         state = State.OFFLINE if self._state is None else self._state
-        self._inputs.reply(
-            encode_status(
-                Status(
-                    session=gate.owner.session,
-                    sequence=counters["status_sent"] & 0xFFFFFFFF,
-                    sim_time_ns=0,
-                    send_time_ns=now_ns(),
-                    echo_sender_time_ns=echo.sender_ns,
-                    receive_time_ns=echo.arrival_ns,
-                    echo_sequence=echo.sequence or 0,
-                    accepted_sequence=echo.sequence or 0,
-                    lost=gate.lost & 0xFFFFFFFF,
-                    reordered=counters["refused_reordered"] & 0xFFFFFFFF,
-                    rejected=counters["refused"] & 0xFFFFFFFF,
-                    scale=self._intake.gain * self._thinker.tuning.scale,
-                    state=WireState(STATES.index(state)),
-                ),
-                self._inputs.owner_key,
-            )
-        )
+        scale = self._intake.gain * self._thinker.tuning.scale
+        packet = status_packet(gate, counters, echo, state, scale)
+        self._inputs.reply(encode_status(packet, self._inputs.owner_key))
         counters["status_sent"] += 1
