@@ -76,6 +76,8 @@ def describe(path: Path) -> str:
         f"planner    {planner['tuning']['algorithm']}, scale {planner['tuning']['scale']:g}, "
         f"{1 / planner['period']:.1f} Hz, {planner['budget'] * 1e3:.1f} ms before the packet",
     ]
+    if planner["side_engines"]:
+        lines.append(f"beside     {', '.join(planner['side_engines'])}")
     lines += [f"source     {s['kind']} on {s['host']}:{s['port']}" for s in resolved["sources"]]
     lines.append(f"engage     {config.operator.engage}")
     if config.web.enabled:
@@ -136,4 +138,16 @@ def status_text(path: Path | None, as_json: bool) -> str:
         lines.append(
             f"plans      {planner['algorithm']}, p99 {planner['solver']['time_p99_ms']:.2f} ms"
         )
+        side = planner["side"]
+        lines += [_engine_line(engine) for engine in (side["driving"], *side["engines"])]
     return "\n".join(lines)
+
+
+def _engine_line(engine: dict[str, Any]) -> str:
+    """One engine in figures of the last half minute."""
+    if engine.get("nrmse") is None:
+        return f"engine     {engine['name']}: {engine.get('trouble') or 'nothing to judge yet'}"
+    return (
+        f"engine     {engine['name']}: force error {engine['nrmse']:.1%}, refused "
+        f"{engine['kappa_refused'] or 0.0:.1%}, legs {engine['leg_use']:.0%}"
+    )

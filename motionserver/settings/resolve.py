@@ -66,7 +66,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
     except TuningError as error:
         raise ConfigError(
             "[planner] side_engines",
-            "; ".join(f"{e.value!r}: {e.message}" for e in error.errors),
+            "; ".join(f"{e.value}: {e.message}" for e in error.errors),
             f"Allowed: {error.errors[0].allowed}.",
         ) from error
     per_plan = ceil(platform.rate_hz / cueing.rate_max_hz)

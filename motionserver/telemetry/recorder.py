@@ -117,7 +117,10 @@ class Recorder:
         empty = [""] * (8 + 4 * len(self._engines))
         if message is None:
             return empty
-        trace = Trace.unpack(message[1])
+        try:
+            trace = Trace.unpack(message[1])
+        except ValueError:
+            return empty
         if now_ns - trace.t_ns > _OLD_NS:
             return empty
         nothing = (None, None, None, None)

@@ -45,5 +45,5 @@ class Trace:
             t_ns, algorithm, kappa, wanted, felt, sides = json.loads(data)
             pairs = {str(name): tuple(values) for name, values in sides.items()}
             return cls(int(t_ns), str(algorithm), kappa, tuple(wanted), tuple(felt), pairs)
-        except (TypeError, AttributeError) as error:
+        except (TypeError, AttributeError, ValueError) as error:
             raise ValueError(f"not a trace of this version: {error}") from error
