@@ -38,6 +38,7 @@ class SideEngine:
         period: Planner period [s].
         homes: Poses (H, 6) that must be reachable straight from a rest pose.
         cueing: A warm algorithm of that name to go on with; None for a fresh one.
+        scores: Its figures until now; None to begin anew.
 
     Attributes:
         algorithm: Its name.
@@ -57,9 +58,10 @@ class SideEngine:
         period: float,
         homes: Array,
         cueing: Cueing | None = None,
+        scores: Scores | None = None,
     ) -> None:
         self.algorithm = algorithm
-        self.scores = Scores(machine, period)
+        self.scores = Scores(machine, period) if scores is None else scores
         self.counters: Counter[str] = Counter()
         self.trouble = ""
         self._period = period

@@ -71,7 +71,7 @@ class Sides:
         """Make one engine that is wanted and missing: more would take longer than a period."""
         for name in self.wanted:
             if name not in (*self._engines, *self._failed, tuning.algorithm):
-                self._make(tuning, name, None)
+                self._make(tuning, name)
                 return
 
     def retune(self, tuning: Tuning) -> None:
@@ -90,6 +90,9 @@ class Sides:
     ) -> None:
         """Another algorithm has taken over: they change places.
 
+        Figures belong to the algorithm and go along, so that all are of the same stretch of the
+        drive.
+
         Args:
             tuning: The new tunables.
             former: The algorithm that drove until now.
@@ -98,13 +101,14 @@ class Sides:
             takeover: The next hand-over in its time [s].
         """
         self.switches += 1
-        driving = tuning.algorithm
-        was_beside = self._engines.pop(driving, None) is not None
-        if was_beside and former not in self.wanted:
+        driving, scores = tuning.algorithm, self.driving
+        beside = self._engines.pop(driving, None)
+        if beside is not None and former not in self.wanted:
             self.wanted = tuple(former if name == driving else name for name in self.wanted)
-        self.driving.forget()
+        self.driving = Scores(*self._made_of[:2]) if beside is None else beside.scores
+        self.driving.pause()
         if former in self.wanted:
-            engine = self._make(tuning, former, cueing)
+            engine = self._make(tuning, former, cueing, scores)
             if engine is not None and plan is not None:
                 engine.start_from(plan, takeover)
         self.retune(tuning)
@@ -173,10 +177,16 @@ class Sides:
             "switches": self.switches,
         }
 
-    def _make(self, tuning: Tuning, name: str, cueing: Cueing | None) -> SideEngine | None:
+    def _make(
+        self,
+        tuning: Tuning,
+        name: str,
+        cueing: Cueing | None = None,
+        scores: Scores | None = None,
+    ) -> SideEngine | None:
         machine, period, homes = self._made_of
         try:
-            engine = SideEngine(machine, tuning, name, period, homes, cueing)
+            engine = SideEngine(machine, tuning, name, period, homes, cueing, scores)
         except Exception as error:
             self._failed[name] = f"{type(error).__name__}: {error}"[:200]
             log.warning("side engine %s cannot be made: %s", name, error)

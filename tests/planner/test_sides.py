@@ -88,6 +88,7 @@ def test_they_change_places_and_keep_what_was_learnt():
     sides = sides_of("classical")
     beside = sides.warm("classical")
     driving = make_cueing(compact(), TUNING, PERIOD)
+    scores = sides.driving, sides._engines["classical"].scores
     target = replace(TUNING, algorithm="classical")
     pose = np.array([0.04, 0.0, 0.0, 0.0, 0.0, 0.0])
     sides.switched(target, "thondel2014", driving, rest_at(pose, 5), 0.2)
@@ -96,6 +97,7 @@ def test_they_change_places_and_keep_what_was_learnt():
     assert sides.warm("thondel2014") is driving
     assert sides.warm("classical") is None
     assert sides.switches == 1
+    assert (sides._engines["thondel2014"].scores, sides.driving) == scores
     sides.think(STILL, LATER)
     assert engines(sides, "classical")["thondel2014"]["rest_pose"][0] == pytest.approx(
         0.04, abs=0.02
