@@ -77,11 +77,6 @@ class Scores:
         self._middle = 0.5 * (machine.leg_max + machine.leg_min)
         self._rows = np.full((max(1, round(WINDOW / period)), _COLUMNS), np.nan)
         self._every = max(1, round(0.25 / period))
-        self.forget()
-
-    def forget(self) -> None:
-        """Begin anew: another algorithm, or a platform that was away."""
-        self._rows[:] = np.nan
         self._count = 0
         self._at = -1
         self._shown: Figures | None = None

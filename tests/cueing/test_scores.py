@@ -84,5 +84,3 @@ def test_the_window_slides(machine):
     scores._shown = None
     assert scores.figures().leg_use < use
     assert scores.figures().periods == length
-    scores.forget()
-    assert scores.figures().periods == 0
