@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from math import degrees
 from typing import Final
@@ -29,8 +29,10 @@ LIMIT_CLASS: Final = {
 """Class of a line that a limit draws."""
 
 STYLE: Final = """
-.ws{display:block;width:100%;height:auto;font:11px system-ui,-apple-system,"Segoe UI",sans-serif}
-.ws text{fill:var(--soft,#667085)} .ws .name{fill:var(--ink,#1d2430);font-weight:600;font-size:12px}
+.ws{display:block;width:100%;height:auto;font:12px system-ui,-apple-system,"Segoe UI",sans-serif}
+.ws text{fill:var(--soft,#667085);paint-order:stroke;stroke:var(--card,#fff);stroke-width:3px;
+stroke-linejoin:round}
+.ws .name{fill:var(--ink,#1d2430);font-weight:600} .ws .plain{stroke:none}
 .ws .axis{stroke:var(--line,#d9dde3)} .ws .lost{fill:var(--bad,#c8372d);opacity:.11}
 .ws .region{fill:var(--card,#fff)} .ws .tint{fill:var(--c1,#2563c9);opacity:.11}
 .ws .box{fill:none;stroke:var(--ink,#1d2430);stroke-width:1.1;stroke-dasharray:4 3;opacity:.75}
@@ -105,13 +107,12 @@ def _edge(points: Sequence[tuple[float, float]], ends: Sequence[Ending]) -> list
 def _axis_words(plane: Plane, middle: float, low: float, stop: float) -> list[str]:
     right, up = TOWARDS[plane.first][1], TOWARDS[plane.second][1]
     return [
-        f'<text x="{stop}" y="{middle - 5}" text-anchor="end">{right}</text>',
-        f'<text x="{middle + 5}" y="{low + 6}">{up}</text>',
+        f'<text x="{stop}" y="{SIDE - 3}" text-anchor="end">{right} \N{RIGHTWARDS ARROW}</text>',
+        f'<text x="{middle + 5}" y="{low - 3}">\N{UPWARDS ARROW} {up}</text>',
     ]
 
 
-def _worst(plane: Plane, half: Array, at: object) -> str:
-    assert callable(at)
+def _worst(plane: Plane, half: Array, at: Callable[[Array], tuple[float, float]]) -> str:
     if plane.worst.scale >= 1.0:
         return ""
     corner = np.array(plane.worst.signs) * half
@@ -120,10 +121,10 @@ def _worst(plane: Plane, half: Array, at: object) -> str:
     tip = f"{plane.worst.scale:.0%}"
     beside = 9 if plane.worst.signs[0] < 0 else -9
     anchor = "start" if beside > 0 else "end"
-    said = corner_of((plane.first, plane.second), plane.worst)
+    where = corner_of((plane.first, plane.second), plane.worst)
     return (
-        f'<g><title>{escape(said)}: {tip} of the way to the corner, {escape(str(plane.worst.ending))}'
-        f'</title><path class="lead" d="M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}"/>'
+        f"<g><title>{escape(where)}: {tip} of the way, {escape(str(plane.worst.ending))}</title>"
+        f'<path class="lead" d="M{x:.1f} {y:.1f}L{end_x:.1f} {end_y:.1f}"/>'
         f'<circle class="worst" cx="{x:.1f}" cy="{y:.1f}" r="3.4"/>'
         f'<text class="note" x="{x + beside:.1f}" y="{y + 4:.1f}" text-anchor="{anchor}">{tip}'
         "</text></g>"
@@ -138,36 +139,38 @@ def picture(inside: str, width: int, height: int, label: str) -> str:
     )
 
 
-def ranges_picture(found: Survey) -> tuple[str, int, int]:
-    """The six axes alone, each to its own scale, the box dashed: inside, width and height."""
-    width, row, left = 620, 46, 64
-    middle, half = (width + left) / 2, (width - left) / 2 - 70
+def ranges_picture(found: Survey, axes: Sequence[int]) -> tuple[str, int, int]:
+    """Some axes alone, each to its own scale, the box dashed: inside, width and height."""
+    width, row, middle = 440, 58, 220.0
     out = []
-    for number, one in enumerate(found.ranges):
+    for number, one in enumerate(found.ranges[axis] for axis in axes):
         y = number * row + 14
         box = float(found.box[one.axis])
-        span = max(abs(one.low), one.high, box)
-        low, high = middle + one.low / span * half, middle + one.high / span * half
+        span = max(abs(one.low), one.high, box) / (middle - 2.0)
+        low, high = middle + one.low / span, middle + one.high / span
         out.append(
-            f'<text class="name" x="0" y="{y + 13}">{one.name}</text>'
-            f'<path class="axis" d="M{middle} {y - 3}v24"/>'
-            f'<rect class="bar" x="{low:.1f}" y="{y}" width="{high - low:.1f}" height="18"/>'
+            f'<text class="name" x="{middle}" y="{y}" text-anchor="middle">{one.name}</text>'
+            f'<path class="axis" d="M{middle} {y + 6}v26"/>'
+            f'<rect class="bar" x="{low:.1f}" y="{y + 9}" width="{high - low:.1f}" height="20"/>'
         )
         for side, x, end in ((0, low, one.low_end), (1, high, one.high_end)):
-            value = (one.low, one.high)[side]
-            anchor, beside = (("end", -7), ("start", 7))[side]
+            value = printed(amount(one.axis, (one.low, one.high)[side]))
+            place = ('x="0"', f'x="{width}" text-anchor="end"')[side]
             out.append(
                 f"<g><title>{escape(TOWARDS[one.axis][side])}: {escape(str(end))}</title>"
-                f'<path class="edge {LIMIT_CLASS[end.limit]}" d="M{x:.1f} {y}v18"/>'
-                f'<text class="name" x="{x + beside:.1f}" y="{y + 8}" text-anchor="{anchor}">'
-                f"{amount(one.axis, value)}</text>"
-                f'<text x="{x + beside:.1f}" y="{y + 22}" text-anchor="{anchor}">'
+                f'<path class="edge {LIMIT_CLASS[end.limit]}" d="M{x:.1f} {y + 9}v20"/>'
+                f'<text {place} y="{y}"><tspan class="name">{value}</tspan> '
                 f"{escape(_legs(end))}</text></g>"
             )
         for sign in (-1, 1):
-            x = middle + sign * box / span * half
-            out.append(f'<path class="box" d="M{x:.1f} {y - 3}v24"/>')
-    return "".join(out), width, 6 * row
+            x = middle + sign * box / span
+            out.append(f'<path class="box" d="M{x:.1f} {y + 6}v26"/>')
+    return "".join(out), width, len(axes) * row - 10
+
+
+def printed(text: str) -> str:
+    """Numbers as a page prints them: a true minus, degrees as a sign."""
+    return text.replace("-", "\N{MINUS SIGN}").replace(" deg", "\N{DEGREE SIGN}")
 
 
 def _legs(ending: Ending) -> str:
@@ -181,29 +184,26 @@ def corners_picture(corners: Sequence[Corner]) -> tuple[str, int, int]:
 
     Columns are the places (surge, sway, heave), rows the attitudes (roll, pitch, yaw).
     """
-    size, left, top = 46, 62, 44
+    size, left, top = 46, 52, 48
     out = []
     signs = [(a, b, c) for a in (1, -1) for b in (1, -1) for c in (1, -1)]
     for number, triple in enumerate(signs):
-        marks = "".join("+" if sign > 0 else "−" for sign in triple)
+        marks = "".join("+" if sign > 0 else "\N{MINUS SIGN}" for sign in triple)
         centre = left + (number + 0.5) * size
         down = top + (number + 0.5) * size + 4
         out.append(f'<text x="{centre}" y="{top - 7}" text-anchor="middle">{marks}</text>')
         out.append(f'<text x="{left - 8}" y="{down}" text-anchor="end">{marks}</text>')
-    out.append(f'<text class="name" x="{left}" y="14">surge, sway, heave</text>')
-    out.append(f'<text class="name" x="0" y="{top - 7}">r, p, y</text>')
+    out.append('<text x="0" y="13">across: surge, sway, heave; down: roll, pitch, yaw</text>')
     for corner in corners:
         column, row = signs.index(corner.signs[:3]), signs.index(corner.signs[3:])  # type: ignore[arg-type]
         x, y = left + column * size, top + row * size
         share = min(corner.scale, 1.0)
-        words = ", ".join(
-            TOWARDS[axis][sign > 0] for axis, sign in enumerate(corner.signs)
-        )
+        words = ", ".join(TOWARDS[axis][sign > 0] for axis, sign in enumerate(corner.signs))
         out.append(
             f"<g><title>{escape(words)}: {share:.0%} of the way, {escape(str(corner.ending))}"
             f'</title><rect class="cell" x="{x + 1}" y="{y + 1}" width="{size - 2}" '
             f'height="{size - 2}" rx="4" opacity="{0.06 + 0.6 * share**1.3:.3f}"/>'
-            f'<text class="name" x="{x + size / 2}" y="{y + size / 2 + 4}" '
+            f'<text class="name plain" x="{x + size / 2}" y="{y + size / 2 + 4}" '
             f'text-anchor="middle">{100 * share:.0f}</text></g>'
         )
     return "".join(out), left + 8 * size, top + 8 * size
@@ -227,7 +227,7 @@ def planes_file(found: Survey) -> str:
     for plane in found.planes:
         half = found.box[[plane.first, plane.second]]
         x, y = plane.first * step + 11, (plane.second - 1) * step + 16
-        names = f"{AXIS_NAMES[plane.first]} → · {AXIS_NAMES[plane.second]} ↑"
+        names = f"{AXIS_NAMES[plane.first]}, {AXIS_NAMES[plane.second]}"
         out.append(
             f'<g transform="translate({x} {y})"><text class="name" x="12" y="4">{names}</text>'
             f"{plane_picture(plane, half, found.ranges)}</g>"

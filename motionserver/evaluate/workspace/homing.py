@@ -10,7 +10,7 @@ import numpy as np
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import Machine
-from motionserver.evaluate.workspace.reach import posture_allowed, reachable
+from motionserver.evaluate.workspace.reach import Bools, posture_allowed, reachable
 
 FACTORS: Final = (1.0, 0.5, 0.3)
 """Sizes of the box, as shares of the whole."""
@@ -53,9 +53,9 @@ def shares(machine: Machine, box: Array) -> tuple[Share, ...]:
     return tuple(out)
 
 
-def stranded(machine: Machine, poses: Array) -> Array:
+def stranded(machine: Machine, poses: Array) -> Bools:
     """Which of the reachable poses (N, 6) have no straight way to neutral and to parked: (N,)."""
-    lost: Array = np.zeros(len(poses), dtype=bool)
+    lost: Bools = np.zeros(len(poses), dtype=bool)
     for home in (np.zeros(6), machine.parked_pose):
         rows = np.flatnonzero(~lost)
         ways = poses[rows, None] + _ALONG * (home - poses[rows])[:, None]

@@ -16,6 +16,7 @@ from motionserver.evaluate.workspace.draw import (
     corners_picture,
     picture,
     plane_picture,
+    printed,
     ranges_picture,
     units,
 )
@@ -26,14 +27,16 @@ from motionserver.evaluate.workspace.words import corner_of, lopsided, pose_text
 
 _STYLE: Final = """
 body{max-width:1360px}
-.two{display:grid;grid-template-columns:minmax(0,3fr) minmax(0,2fr);gap:16px;align-items:start}
-.two .frame{margin:0;padding:16px 18px}.frame h3{font-size:15px;margin:0 0 10px}
+.two{display:grid;grid-template-columns:1fr 1fr;gap:0 56px}.two .ws{margin:4px 0}
+.frame h3{font-size:14px;margin:0 0 6px}
+.wide{padding:18px 22px}.field{grid-area:2/4/4/6;margin:0;padding:14px 16px}
+.planes .ws{margin:2px 0}
 .warn{border:1px solid var(--line);border-left:4px solid var(--c2);background:var(--card);
 border-radius:10px;padding:10px 16px;margin:0 0 10px}.warn b{display:block;font-weight:600}
 .planes{display:grid;grid-template-columns:repeat(5,minmax(0,1fr));gap:12px}
 figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:10px;
 padding:10px 12px 8px}
-figcaption{display:flex;justify-content:space-between;gap:8px;font-size:13px}
+figcaption{display:flex;justify-content:space-between;gap:8px;font-size:13px;white-space:nowrap}
 figcaption b{font-weight:600}figcaption span,figure small{color:var(--soft)}
 figure small{display:block;font-size:12px;line-height:1.35;min-height:2.7em}
 .key{grid-column:2/-1;grid-row:1;align-self:center;padding:0 12px 0 28px;max-width:720px}
@@ -46,12 +49,13 @@ margin-right:7px}.key i.dash{border-top:2px dashed}
 align-items:start}.tables .frame{margin:0}
 @media(max-width:1100px){.planes{grid-template-columns:repeat(3,minmax(0,1fr))}
 .planes figure{grid-area:auto!important}.key{grid-column:1/-1;padding:0}
-.two{grid-template-columns:minmax(0,1fr)}}
+.field{grid-area:auto/1/auto/-1;order:1;max-width:560px}}
 @media(max-width:620px){body{padding:20px 14px 40px}
 .planes{grid-template-columns:repeat(2,minmax(0,1fr));gap:8px}figure{padding:8px}
 figcaption{display:block}figcaption span{display:block}.cards{gap:8px}
 .card{flex-basis:130px;padding:10px 12px}.card b{font-size:22px}th,td{padding:4px 6px}
-.two .frame{padding:12px}}
+.two{grid-template-columns:minmax(0,1fr)}.wide,.field{padding:12px}.frame .ws{font-size:14px}
+figure .ws{font-size:17px}}
 """
 _KEY: Final = (
     ("--c1", "a leg at its longest"),
@@ -66,14 +70,16 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
     machine = found.machine
     title = f"Workspace of {machine.name}"
     said = [text for one in found.ranges if (text := lopsided(one))]
-    notes = "".join(f"<p>{escape(text[0].upper() + text[1:])}.</p>" for text in said)
+    notes = "".join(f"<p>{escape(printed(text[0].upper() + text[1:]))}.</p>" for text in said)
     warned = "".join(
         f'<div class="warn"><b>{escape(one.what[0].upper() + one.what[1:])}.</b>'
         f"{escape(one.do)}</div>"
         for one in warnings
     )
-    bars, width, height = ranges_picture(found)
-    field, across, down = corners_picture(found.corners)
+    bars = "".join(
+        picture(*ranges_picture(found, axes), f"{what} alone")
+        for axes, what in (((0, 1, 2), "places"), ((3, 4, 5), "attitudes"))
+    )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
@@ -82,12 +88,9 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
         "joint angle or conditioning first ends the way. Geometry and limits "
         f"<code>{machine.digest}</code>; pitch is positive nose down. motionserver "
         f"{__version__}.</p>{_cards(found)}{warned}"
-        '<h2>One axis at a time, and all six at once</h2><div class="two">'
-        f'<div class="frame"><h3>Each axis alone, the tuned box dashed</h3>'
-        f"{picture(bars, width, height, 'single-axis ranges')}{notes}</div>"
-        '<div class="frame"><h3>The 64 corners of the box: per cent of the way reached</h3>'
-        f"{picture(field, across, down, 'corners of the box')}</div></div>"
-        f'<h2>Two axes at a time</h2><div class="planes">{_key(found)}'
+        '<h2>One axis at a time</h2><div class="frame wide"><div class="two">'
+        f"{bars}</div>{notes}</div>"
+        f'<h2>Two axes at a time, and all six</h2><div class="planes">{_key(found)}{_field(found)}'
         + "".join(_figure(plane, found) for plane in found.planes)
         + f"</div><h2>Figures</h2>{_tables(found)}</body></html>\n"
     )
@@ -99,10 +102,13 @@ def _cards(found: Survey) -> str:
     swing = found.swing
     cards = (
         (f"{whole} of 64", "corners of the tuned box reachable"),
-        (f"× {smallest_whole(found):.2f}", "size of the box at which all 64 are"),
+        (
+            f"\N{MULTIPLICATION SIGN} {smallest_whole(found):.2f}",
+            "size of the box at which all 64 are",
+        ),
         (f"{half.reachable:.0%}", "of random poses in half the box reachable"),
         (f"{half.stranded:.1%}", "of these without a straight way home"),
-        (f"{found.conditioning.value:.2f}", "least σ_min, as a share of neutral's"),
+        (f"{found.conditioning.value:.2f}", "least sigma_min, as a share of neutral's"),
         (f"{degrees(swing.value):.1f}°", f"largest joint angle, {_allowed(swing.limit)}"),
     )
     return (
@@ -135,6 +141,14 @@ def _key(found: Survey) -> str:
     )
 
 
+def _field(found: Survey) -> str:
+    field = picture(*corners_picture(found.corners), "corners of the box")
+    return (
+        '<div class="frame field"><h3>The 64 corners of the box, per cent of the way reached</h3>'
+        f"{field}</div>"
+    )
+
+
 def _figure(plane: Plane, found: Survey) -> str:
     half = found.box[[plane.first, plane.second]]
     first, second = AXIS_NAMES[plane.first], AXIS_NAMES[plane.second]
@@ -144,11 +158,11 @@ def _figure(plane: Plane, found: Survey) -> str:
     worst = (
         "the whole rectangle is reachable"
         if plane.worst.scale >= 1.0
-        else f"least {where}: {legs}"
+        else f"tightest {where}: {legs}"
     )
     return (
         f'<figure style="grid-area:{plane.second}/{plane.first + 1}"><figcaption>'
-        f"<b>{first} → {second} ↑</b><span>{plane.share:.0%} of the box</span></figcaption>"
+        f"<b>{first}, {second}</b><span>{plane.share:.0%} of box</span></figcaption>"
         f"{picture(inside, SIDE, SIDE, f'{first} and {second}')}"
         f"<small>{escape(worst)}</small></figure>"
     )
@@ -156,20 +170,20 @@ def _figure(plane: Plane, found: Survey) -> str:
 
 def _tables(found: Survey) -> str:
     counted = "".join(
-        f"<tr><td>× {size:g}</td><td>{count}</td></tr>"
+        f"<tr><td>&times; {size:g}</td><td>{count}</td></tr>"
         for size, count in corner_counts(found.corners)
     )
     drawn = "".join(
-        f"<tr><td>× {one.factor:g}</td><td>{one.reachable:.1%}</td><td>"
-        + (f"{one.stranded:.1%}" if one.tried else "–")
+        f"<tr><td>&times; {one.factor:g}</td><td>{one.reachable:.1%}</td><td>"
+        + (f"{one.stranded:.1%}" if one.tried else "-")
         + "</td></tr>"
         for one in found.shares
     )
     places = (
-        f"<tr><td>least σ_min: {escape(pose_text(found.conditioning.pose))}</td>"
+        f"<tr><td>least sigma_min: {escape(printed(pose_text(found.conditioning.pose)))}</td>"
         f"<td>{found.conditioning.value:.3f}</td></tr>"
         f"<tr><td>largest joint angle, leg {found.swing.leg}: "
-        f"{escape(pose_text(found.swing.pose))}</td><td>{degrees(found.swing.value):.1f}°</td></tr>"
+        f"{escape(printed(pose_text(found.swing.pose)))}</td><td>{degrees(found.swing.value):.1f}°</td></tr>"
     )
     return (
         '<div class="tables"><div class="frame"><table><thead><tr><th>size of the box</th>'

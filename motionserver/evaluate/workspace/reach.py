@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import (
@@ -19,6 +20,8 @@ from motionserver.core.kinematics.hexapod import (
 )
 from motionserver.core.kinematics.rotation import rotation
 from motionserver.core.limits import Machine
+
+Bools = NDArray[np.bool_]
 
 STEPS: Final = 64
 """Samples along a way while its fastest leg, at neutral's slope, uses up the whole stroke."""
@@ -76,21 +79,21 @@ class Exits:
     endings: tuple[Ending, ...]
 
 
-def reachable(machine: Machine, poses: Array) -> Array:
+def reachable(machine: Machine, poses: Array) -> Bools:
     """Whether stroke, joint angles and conditioning allow each of the poses (N, 6): bool (N,).
 
     The limits are the machine's own; the guard keeps small margins to them.
     """
     legs = leg_lengths(machine, poses)
-    allowed: Array = np.all((legs >= machine.leg_min) & (legs <= machine.leg_max), axis=1)
+    allowed: Bools = np.all((legs >= machine.leg_min) & (legs <= machine.leg_max), axis=1)
     rows = np.flatnonzero(allowed)
     allowed[rows] = posture_allowed(machine, poses[rows])
     return allowed
 
 
-def posture_allowed(machine: Machine, poses: Array) -> Array:
+def posture_allowed(machine: Machine, poses: Array) -> Bools:
     """Whether joint angles and conditioning alone allow each of the poses (N, 6): bool (N,)."""
-    allowed: Array = np.ones(len(poses), dtype=bool)
+    allowed: Bools = np.ones(len(poses), dtype=bool)
     if machine.joint_angle is not None:
         allowed = joint_angles(machine, poses).max((1, 2)) <= machine.joint_angle
     if machine.conditioning is not None:
@@ -102,7 +105,7 @@ def posture_allowed(machine: Machine, poses: Array) -> Array:
     return allowed
 
 
-def _surely_conditioned(machine: Machine, poses: Array, least: float) -> Array:
+def _surely_conditioned(machine: Machine, poses: Array, least: float) -> Bools:
     """True where 1 / |J^-1| (Frobenius), never above the smallest singular value, is enough.
 
     Spares nearly all poses the decomposition, which costs several times as much.
@@ -115,7 +118,7 @@ def _surely_conditioned(machine: Machine, poses: Array, least: float) -> Array:
         inverse = np.linalg.inv(rows)
     except np.linalg.LinAlgError:
         return np.zeros(len(poses), dtype=bool)
-    sure: Array = np.einsum("nij,nij->n", inverse, inverse) * least**2 < 1.0
+    sure: Bools = np.einsum("nij,nij->n", inverse, inverse) * least**2 < 1.0
     return sure
 
 

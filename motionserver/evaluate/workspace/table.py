@@ -88,14 +88,14 @@ def _brief(corner: Corner) -> str:
 
 def _corners(found: Survey) -> list[str]:
     sizes = "".join(f"{f'x {size:g}':>7}" for size in SIZES)
-    lines = ["", f"  corners reachable, of 64{sizes}  all up to  any up to"]
+    lines = ["", f"  corners reached, of 64{sizes} all up to  any up to"]
     rows = [("tuned box", found.corners)]
     if found.machine_corners != found.corners:
         rows.append(("machine's box", found.machine_corners))
     for name, corners in rows:
         counts = "".join(f"{count:>7}" for _, count in corner_counts(corners))
         scales = [corner.scale for corner in corners]
-        lines.append(f"    {name:<22}{counts}{min(scales):>11.2f}{max(scales):>11.2f}")
+        lines.append(f"    {name:<20}{counts}{min(scales):>10.2f}{max(scales):>11.2f}")
     return lines
 
 
@@ -137,6 +137,4 @@ def _where(name: str, extreme: Extreme) -> str:
 
 def _wrapped(lead: str, text: str) -> list[str]:
     indent = " " * len(lead)
-    return wrap(
-        text, WIDTH, initial_indent=lead, subsequent_indent=indent, break_long_words=False
-    )
+    return wrap(text, WIDTH, initial_indent=lead, subsequent_indent=indent, break_long_words=False)

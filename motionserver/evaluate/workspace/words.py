@@ -31,9 +31,7 @@ def amount(axis: int, value: float, signed: bool = True) -> str:
 
 def corner_of(axes: tuple[int, int], corner: Corner) -> str:
     """A corner of a plane: ``backwards, nose down``."""
-    return ", ".join(
-        TOWARDS[axis][sign > 0] for axis, sign in zip(axes, corner.signs, strict=True)
-    )
+    return ", ".join(TOWARDS[axis][sign > 0] for axis, sign in zip(axes, corner.signs, strict=True))
 
 
 def pose_text(pose: tuple[float, ...]) -> str:
