@@ -11,13 +11,13 @@ import numpy as np
 
 from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.evaluate.workspace.reach import Ending, Limit
-from motionserver.evaluate.workspace.survey import Corner, Plane, Range, Survey
+from motionserver.evaluate.workspace.survey import Corner, Plane, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount, corner_of
 
 SIDE: Final = 240
 """Width and height of a plane's picture [px]."""
 _MARGIN: Final = 34
-_ROOM: Final = 1.12
+_ROOM: Final = 1.02
 
 LIMIT_CLASS: Final = {
     Limit.LONGEST: "long",
@@ -47,27 +47,32 @@ stroke-linejoin:round}
 """Style of all pictures; a page may set the variables."""
 
 
-def plane_picture(plane: Plane, half: Array, ranges: Sequence[Range]) -> str:
+def scales(found: Survey) -> Array:
+    """Half width of each axis in all its planes, (6,): one axis, one scale."""
+    out: Array = found.box.copy()
+    for plane in found.planes:
+        pair = [plane.first, plane.second]
+        out[pair] = np.maximum(out[pair], np.abs(plane.edge).max(0))
+    return out * _ROOM
+
+
+def plane_picture(plane: Plane, half: Array, span: Array) -> str:
     """One plane: the reachable part, coloured along its edge by what ends it, and the box.
 
     Args:
         plane: What was found.
         half: Half sides of the box in this plane, (2,) [m or rad].
-        ranges: All six, for the scale: the same axis is drawn to the same scale everywhere.
+        span: Half sides of the picture, (2,), see `scales`.
 
     Returns:
         The inside of an SVG of `SIDE` by `SIDE`.
     """
-    span = [
-        _ROOM * max(abs(one.low), one.high, float(size))
-        for one, size in zip((ranges[plane.first], ranges[plane.second]), half, strict=True)
-    ]
     middle, inner = SIDE / 2, SIDE / 2 - _MARGIN / 2
 
     def at(point: Array) -> tuple[float, float]:
         return (
-            middle + float(point[0]) / span[0] * inner,
-            middle - float(point[1]) / span[1] * inner,
+            middle + float(point[0] / span[0]) * inner,
+            middle - float(point[1] / span[1]) * inner,
         )
 
     points = [at(point) for point in plane.edge]
@@ -108,7 +113,7 @@ def _axis_words(plane: Plane, middle: float, low: float, stop: float) -> list[st
     right, up = TOWARDS[plane.first][1], TOWARDS[plane.second][1]
     return [
         f'<text x="{stop}" y="{SIDE - 3}" text-anchor="end">{right} \N{RIGHTWARDS ARROW}</text>',
-        f'<text x="{middle + 5}" y="{low - 3}">\N{UPWARDS ARROW} {up}</text>',
+        f'<text x="{middle}" y="{low - 5}" text-anchor="middle">\N{UPWARDS ARROW} {up}</text>',
     ]
 
 
@@ -216,7 +221,7 @@ def units(axis: int, value: float) -> str:
 
 def planes_file(found: Survey) -> str:
     """All planes as one SVG file of its own, a triangle of pictures that share their axes."""
-    step = SIDE + 22
+    step, sides = SIDE + 22, scales(found)
     width, height = 5 * step, 5 * step
     out = [
         f'<svg class="ws" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
@@ -230,6 +235,6 @@ def planes_file(found: Survey) -> str:
         names = f"{AXIS_NAMES[plane.first]}, {AXIS_NAMES[plane.second]}"
         out.append(
             f'<g transform="translate({x} {y})"><text class="name" x="12" y="4">{names}</text>'
-            f"{plane_picture(plane, half, found.ranges)}</g>"
+            f"{plane_picture(plane, half, sides[[plane.first, plane.second]])}</g>"
         )
     return "".join(out) + "</svg>\n"

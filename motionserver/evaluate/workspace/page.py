@@ -8,7 +8,7 @@ from math import degrees
 from typing import Final
 
 from motionserver import __version__
-from motionserver.core.axes import AXIS_NAMES
+from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.evaluate.page import STYLE
 from motionserver.evaluate.workspace.advice import Advice, smallest_whole
 from motionserver.evaluate.workspace.draw import (
@@ -18,6 +18,7 @@ from motionserver.evaluate.workspace.draw import (
     plane_picture,
     printed,
     ranges_picture,
+    scales,
     units,
 )
 from motionserver.evaluate.workspace.draw import STYLE as PICTURE_STYLE
@@ -29,7 +30,7 @@ _STYLE: Final = """
 body{max-width:1360px}
 .two{display:grid;grid-template-columns:1fr 1fr;gap:0 56px}.two .ws{margin:4px 0}
 .frame h3{font-size:14px;margin:0 0 6px}
-.wide{padding:18px 22px}.field{grid-area:2/4/4/6;margin:0;padding:14px 16px}
+.wide{padding:18px 22px}.field{grid-area:2/4/4/6;margin:0;padding:14px 16px;align-self:start}
 .planes .ws{margin:2px 0}
 .warn{border:1px solid var(--line);border-left:4px solid var(--c2);background:var(--card);
 border-radius:10px;padding:10px 16px;margin:0 0 10px}.warn b{display:block;font-weight:600}
@@ -40,6 +41,7 @@ figcaption{display:flex;justify-content:space-between;gap:8px;font-size:13px;whi
 figcaption b{font-weight:600}figcaption span,figure small{color:var(--soft)}
 figure small{display:block;font-size:12px;line-height:1.35;min-height:2.7em}
 .key{grid-column:2/-1;grid-row:1;align-self:center;padding:0 12px 0 28px;max-width:720px}
+.key .soft{font-size:13px;margin-top:10px}
 .key ul{display:flex;flex-wrap:wrap;gap:6px 20px;list-style:none;margin:10px 0 0;padding:0;
 font-size:13px}
 .key i{display:inline-block;width:20px;height:0;border-top:3px solid;vertical-align:middle;
@@ -76,6 +78,7 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
         f"{escape(one.do)}</div>"
         for one in warnings
     )
+    sides = scales(found)
     bars = "".join(
         picture(*ranges_picture(found, axes), f"{what} alone")
         for axes, what in (((0, 1, 2), "places"), ((3, 4, 5), "attitudes"))
@@ -91,7 +94,7 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
         '<h2>One axis at a time</h2><div class="frame wide"><div class="two">'
         f"{bars}</div>{notes}</div>"
         f'<h2>Two axes at a time, and all six</h2><div class="planes">{_key(found)}{_field(found)}'
-        + "".join(_figure(plane, found) for plane in found.planes)
+        + "".join(_figure(plane, found, sides) for plane in found.planes)
         + f"</div><h2>Figures</h2>{_tables(found)}</body></html>\n"
     )
 
@@ -149,11 +152,12 @@ def _field(found: Survey) -> str:
     )
 
 
-def _figure(plane: Plane, found: Survey) -> str:
-    half = found.box[[plane.first, plane.second]]
+def _figure(plane: Plane, found: Survey, sides: Array) -> str:
+    pair = [plane.first, plane.second]
+    half, span = found.box[pair], sides[pair]
     first, second = AXIS_NAMES[plane.first], AXIS_NAMES[plane.second]
     where = corner_of((plane.first, plane.second), plane.worst)
-    inside = plane_picture(plane, half, found.ranges)
+    inside = plane_picture(plane, half, span)
     legs = plane.worst.ending
     worst = (
         "the whole rectangle is reachable"
