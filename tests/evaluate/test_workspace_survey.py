@@ -81,7 +81,7 @@ def test_joint_angles_end_a_way_at_the_leg_that_swings_most():
             continue
         leg = exits.endings[row].legs[0] - 1
         neutral = machine.platform_joints[leg] - machine.base_joints[leg]
-        neutral = neutral + [0.0, 0.0, machine.neutral_height]
+        neutral = neutral + np.array([0.0, 0.0, machine.neutral_height])
         moved = neutral + exits.poses[row, :3]
         cosine = neutral @ moved / np.linalg.norm(neutral) / np.linalg.norm(moved)
         assert np.degrees(np.arccos(cosine)) == pytest.approx(10.0, abs=1e-4)

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import Array
-from motionserver.evaluate.workspace.homing import Share
 from motionserver.evaluate.workspace.reach import Limit
 from motionserver.evaluate.workspace.survey import Range, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount
@@ -54,7 +53,7 @@ def advice(
         ),
         *_head(found),
         *_corners(found, leg_rows),
-        *_stranded(found.shares),
+        *_stranded(found),
     )
 
 
@@ -138,8 +137,8 @@ def _corners(found: Survey, leg_rows: bool) -> list[Advice]:
     ]
 
 
-def _stranded(shares: tuple[Share, ...]) -> list[Advice]:
-    lost = [one for one in shares if one.stranded > 0.0]
+def _stranded(found: Survey) -> list[Advice]:
+    lost = [one for one in found.shares if one.stranded > 0.0]
     if not lost:
         return []
     said = ", ".join(
@@ -147,10 +146,15 @@ def _stranded(shares: tuple[Share, ...]) -> list[Advice]:
         + ("the whole box" if one.factor == 1.0 else f"{one.factor:g} of the box")
         for one in lost
     )
+    do = "Plans that would end there are refused and cut down, so nothing is unsafe"
+    if found.parking is not None:
+        heave, left = found.parking
+        do += f"; workspace.parked.heave = {heave:g} would leave {left:.1%} in the whole box"
     return [
         Advice(
-            f"some reachable poses have no straight way to neutral and to the parked pose: {said}",
-            "Plans that would end there are refused and cut down, so nothing is unsafe; park "
-            "higher (workspace.parked.heave nearer to 0) if the machine may, or use a smaller box.",
+            "some reachable poses have no straight way to neutral and to the parked pose: " + said,
+            f"{do}; a smaller box helps as well."
+            if found.parking
+            else f"{do}; a smaller box helps.",
         )
     ]

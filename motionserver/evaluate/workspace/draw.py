@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 from math import degrees
@@ -174,8 +175,10 @@ def ranges_picture(found: Survey, axes: Sequence[int]) -> tuple[str, int, int]:
 
 
 def printed(text: str) -> str:
-    """Numbers as a page prints them: a true minus, degrees as a sign."""
-    return text.replace("-", "\N{MINUS SIGN}").replace(" deg", "\N{DEGREE SIGN}")
+    """Numbers as a page prints them: a true minus, a true plus-minus, degrees as a sign."""
+    text = text.replace("+-", "\N{PLUS-MINUS SIGN}")
+    text = re.sub(r"(?<![\w.])-(?=\d)", "\N{MINUS SIGN}", text)
+    return re.sub(r"(?<=\d) deg\b", "\N{DEGREE SIGN}", text)
 
 
 def _legs(ending: Ending) -> str:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from motionserver.core.axes import Array
+from motionserver.core.axes import Array, Axis, frozen
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import Machine
 from motionserver.evaluate.workspace.reach import Bools, posture_allowed, reachable
 
 FACTORS: Final = (1.0, 0.5, 0.3)
 """Sizes of the box, as shares of the whole."""
-_POSES: Final = 20000
+_POSES: Final = (50000, 4000, 2000)
+"""How many are drawn of each: of a large box few are reachable."""
 _TRIED: Final = 1500
 _ALONG: Final = np.linspace(0.0, 1.0, 65)[:, None]
 _POSTURE_EVERY: Final = 4
+_HIGHER: Final = (0.85, 0.7, 0.5, 0.3)
+"""Parked heights that are tried instead, as shares of the machine's."""
+FEW: Final = 0.02
+"""Share of poses without a way home that is called few."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +46,18 @@ class Share:
 def shares(machine: Machine, box: Array) -> tuple[Share, ...]:
     """Draw poses evenly from the box (6,) at each of its `FACTORS`; always the same ones."""
     out = []
-    unit = np.random.default_rng(2).uniform(-1.0, 1.0, (_POSES, 6))
-    for factor in FACTORS:
-        # the smallest box is reachable nearly throughout: fewer poses tell as much
-        poses = unit[: int(_POSES * max(factor, 0.3) ** 2)] * (factor * box)
-        good = reachable(machine, poses)
-        reached = poses[good][:_TRIED]
-        lost = stranded(machine, reached) if len(reached) else np.zeros(0, dtype=bool)
-        share = float(lost.mean()) if len(lost) else 0.0
-        out.append(Share(factor, float(good.mean()), share, len(reached)))
+    for factor, count in zip(FACTORS, _POSES, strict=True):
+        share, reached = _drawn(machine, factor * box, count)
+        lost = stranded(machine, reached)
+        out.append(Share(factor, share, float(np.mean(lost)) if len(lost) else 0.0, len(lost)))
     return tuple(out)
+
+
+def _drawn(machine: Machine, box: Array, count: int) -> tuple[float, Array]:
+    """Share of ``count`` random poses of a box that is reachable; and those poses, or enough."""
+    poses = np.random.default_rng(2).uniform(-1.0, 1.0, (count, 6)) * box
+    good = reachable(machine, poses)
+    return float(good.mean()), poses[good][:_TRIED]
 
 
 def stranded(machine: Machine, poses: Array) -> Bools:
@@ -66,3 +73,20 @@ def stranded(machine: Machine, poses: Array) -> Bools:
         kept[kept] = posture.all(1)
         lost[rows] = ~kept
     return lost
+
+
+def park_higher(machine: Machine, box: Array) -> tuple[float, float] | None:
+    """Find the lowest parked heave nearer to neutral that leaves few poses without a way home.
+
+    Returns:
+        That heave [m] and the share of the reachable poses of the whole box that are left
+        without a way home; None if no height helps.
+    """
+    _, poses = _drawn(machine, box, _POSES[0])
+    for share in _HIGHER if len(poses) else ():
+        parked = machine.parked_pose * share
+        parked[Axis.HEAVE] = round(float(parked[Axis.HEAVE]), 3)
+        lost = stranded(replace(machine, parked_pose=frozen(parked)), poses)
+        if float(lost.mean()) <= FEW:
+            return float(parked[Axis.HEAVE]), float(lost.mean())
+    return None

@@ -74,8 +74,8 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
     said = [text for one in found.ranges if (text := lopsided(one))]
     notes = "".join(f"<p>{escape(printed(text[0].upper() + text[1:]))}.</p>" for text in said)
     warned = "".join(
-        f'<div class="warn"><b>{escape(one.what[0].upper() + one.what[1:])}.</b>'
-        f"{escape(one.do)}</div>"
+        f'<div class="warn"><b>{escape(printed(one.what[0].upper() + one.what[1:]))}.</b>'
+        f"{escape(printed(one.do))}</div>"
         for one in warnings
     )
     sides = scales(found)

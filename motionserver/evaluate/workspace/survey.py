@@ -12,7 +12,7 @@ from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.core.kinematics.hexapod import conditioning, joint_angles, neutral_conditioning
 from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
-from motionserver.evaluate.workspace.homing import Share, shares
+from motionserver.evaluate.workspace.homing import FEW, Share, park_higher, shares
 from motionserver.evaluate.workspace.reach import Ending, Exits, first_exits, reachable
 
 RAYS: Final = 72
@@ -119,6 +119,8 @@ class Survey:
         corners: The 64 corners of the box.
         machine_corners: The same of the machine's own box.
         shares: Of random poses in the box, drawn smaller and smaller.
+        parking: A parked heave [m] that leaves few poses without a way home, and the share that it
+            leaves; None if there are few already, or no height helps.
         conditioning: Least sigma_min on the edge, as a share of neutral's.
         swing: Largest joint angle on the edge.
     """
@@ -131,6 +133,7 @@ class Survey:
     corners: tuple[Corner, ...]
     machine_corners: tuple[Corner, ...]
     shares: tuple[Share, ...]
+    parking: tuple[float, float] | None
     conditioning: Extreme
     swing: Extreme
 
@@ -175,6 +178,7 @@ def survey(machine: Machine, box: Array | None = None) -> Survey:
             first_exits(machine, random).poses,
         )
     )
+    drawn = shares(machine, box)
     return Survey(
         machine,
         box,
@@ -183,7 +187,8 @@ def survey(machine: Machine, box: Array | None = None) -> Survey:
         planes,
         _corners(_CORNERS, corner_exits),
         _corners(_CORNERS, own_exits),
-        shares(machine, box),
+        drawn,
+        park_higher(machine, box) if drawn[0].stranded > FEW else None,
         _least_conditioning(machine, edge),
         _largest_swing(machine, edge),
     )
