@@ -97,6 +97,23 @@ def test_a_pose_behind_a_gap_does_not_count():
     assert exits.reach[0] < 0.5
 
 
+@pytest.mark.parametrize("depth", [0.0002, 0.0005, 0.001])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_narrow_gap_ends_a_way(axis, depth):
+    # a leg that leans shortens, stands, and lengthens again: the stroke's end just cuts that dip
+    way = np.linspace(0.0, 0.6, 6001)
+    poses = np.zeros((len(way), 6))
+    poses[:, axis] = way
+    legs = own_kinematics.lengths(science_fit(), poses)
+    machine = replace(science_fit(), leg_min=legs.min() + depth, leg_max=legs.max() + 0.01)
+    outside = beyond(machine, poses) > 0.0
+    first = way[np.argmax(outside)]
+    assert not outside[-1]
+    exits = first_exits(machine, np.eye(6)[[axis]])
+    assert exits.reach[0] == pytest.approx(first, abs=2e-4)
+    assert exits.endings[0].limit is Limit.SHORTEST
+
+
 @pytest.mark.parametrize(
     ("machine", "low", "high"),
     [
