@@ -30,6 +30,7 @@ _SI_NAMES: Final = {
     "tilt_acceleration_deg_s2": "tilt_acceleration",
     "translation_threshold_m_s2": "translation_threshold",
     "horizon_s": "horizon",
+    "mpc_trust_s": "mpc_trust",
 }
 _ROUNDING: Final = 1e-9
 """Slack of a box against the machine's, for degrees that came from radians."""

@@ -168,6 +168,11 @@ class TuningFields(BaseModel):
         "Price of tilting faster than the tilt rate.",
         "tilting stays below the threshold, sustained forces arrive later",
     )
+    mpc_trust_s: float = number(
+        _START.mpc_trust, 0.2, 20.0, "s", group="Six axes", label="Trust",
+        meaning="How far ahead a prediction is believed; a preview is believed to its end.",
+        more="smoother, earlier preparation; weaker onsets",
+    )
     perception: Literal["none", "telban-cardullo", "reid-nahon"] = choice(
         _START.perception, group="Six axes", label="Perception",
         meaning="Judge the error as the inner ear would: not at all, or with one of two models.",
