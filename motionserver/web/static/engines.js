@@ -2,7 +2,7 @@
 import { send, sentence } from "./api.js";
 import { byId, fixed, isNumber, list, make, put } from "./dom.js";
 
-export const COLOURS = ["#d79ac0", "#f0d442", "#35c9a3", "#ff7a45", "#9fadba", "#b7c65a"];
+export const COLOURS = ["#d79ac0", "#f0d442", "#9be564", "#ff8f6b", "#9fadba", "#35c9a3"];
 const LASTING = 4000;
 const percent = (share, digits = 0) => (isNumber(share) ? `${fixed(100 * share, digits)} %` : "–");
 

@@ -62,7 +62,7 @@ export class Plots {
     for (const { plot } of this.forces) {
       plot.setData([[], [], [], []], false);
       while (plot.series.length > 4) plot.delSeries(plot.series.length - 1);
-      for (const name of names) plot.addSeries({ stroke: colour(name), width: 1, points: { show: false }, spanGaps: false });
+      for (const name of names) plot.addSeries({ stroke: colour(name), width: 1.3, points: { show: false }, spanGaps: false });
     }
     this.sides = [...names];
     byId("side-keys").replaceChildren(...names.map((name) => {

@@ -26,7 +26,8 @@ export class Tuning {
     const answer = await send("GET", "/api/tuning");
     if (!answer.ok) return this.say(sentence(answer.body), true);
     if (!this.rows.size) this.build(answer.body.fields);
-    this.take(answer.body);
+    // what somebody has typed meanwhile stays
+    if (this.version === null || Object.keys(this.changes()).length === 0) this.take(answer.body);
     await this.listPresets();
   }
 
