@@ -185,7 +185,7 @@ def test_two_sources_on_one_port_are_refused(tmp_path: Path, cli: Cli) -> None:
     assert f"[[sources]] beamng {listen}" in ended.stderr
 
 
-@pytest.mark.parametrize("words", [("engage",), ("park",), ("reset",), ("status",)])
+@pytest.mark.parametrize("words", [("engage",), ("park",), ("reset",), ("status",), ("record",)])
 def test_nobody_to_talk_to(tmp_path: Path, cli: Cli, words: tuple[str, ...]) -> None:
     for folder in (tmp_path / "never", tmp_path):
         path = write(tmp_path / "c.toml", server={"run_dir": str(folder)})
