@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from motionserver.core.state import Preview, Stimulus
-from motionserver.cueing.reference import HEAVE_FADE, Reference
+from motionserver.cueing.reference import Reference
+from motionserver.cueing.reference_base import HEAVE_FADE
 
 TIMES = np.array([0.01, 0.1, 0.5, 1.0, 2.0])
 
@@ -77,7 +78,9 @@ def test_preview_that_begins_later_is_joined_to_now():
 
 def test_lead_is_counted():
     preview = Preview(np.array([0.0, 1.0]), np.array([[0.0] * 3, [1.0] * 3]), np.zeros((2, 3)))
-    out = Reference("constant", 0.01, np.array([0.3]), 0.2).predict(stimulus(preview=preview))
+    out = Reference("constant", 0.01, np.array([0.3]), 0.2).predict(
+        stimulus(force=(0.0, 0.0, 0.0), preview=preview)
+    )
     assert out[0, 0] == pytest.approx(0.5)
 
 
