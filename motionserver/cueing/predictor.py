@@ -17,6 +17,8 @@ from motionserver.core.axes import Array, frozen
 FORMAT: Final = "motionserver-predictor-1"
 FEATURES: Final = 22
 """Length of a row of features, see `reference_learned.Features`."""
+FORCE_FEATURES: Final = 10
+"""Those of them at the beginning that hold nothing but the force of that axis."""
 LARGEST_WEIGHT: Final = 100.0
 """No fit in its right mind has a larger weight."""
 

@@ -72,8 +72,10 @@ def _within(value: float, bound: float) -> float:
 def _believable_driver(told: Driver) -> Driver | None:
     if not all(map(isfinite, (told.throttle, told.brake, told.clutch, told.steering))):
         return None
-    pedals = [min(max(pedal, 0.0), 1.0) for pedal in (told.throttle, told.brake, told.clutch)]
-    return Driver(*pedals, _within(told.steering, LARGEST_STEERING), told.gear)
+    throttle, brake, clutch = (
+        min(max(pedal, 0.0), 1.0) for pedal in (told.throttle, told.brake, told.clutch)
+    )
+    return Driver(throttle, brake, clutch, _within(told.steering, LARGEST_STEERING), told.gear)
 
 
 class Reference:

@@ -1,6 +1,8 @@
 """Surge, sway and yaw from what the driver does: the vehicle's answer, and the rest autoregressive.
 
-Pedals and steering lead the motion by the vehicle's own delay. The model is trusted as far as it
+Pedals and steering lead the motion by the vehicle's own delay. Pedals are held over the horizon. The
+wheel is not, for it swings back: its own autoregressive forecast takes 10 to 25 % off the error of
+sway that a held one makes (measured on a simulated drive). The model is trusted as far as it
 foretold the last seconds better than the autoregressive model alone; without controls, or with
 controls that explain nothing, that model remains.
 """
@@ -44,8 +46,10 @@ class Vehicle:
         self._decay = Decay(instants)
         self._standstill = Standstill(instants)
         self._plant = VehiclePlant(period, instants)
-        # the force itself and what the vehicle's answer leaves of it, unscaled
-        self._slow = SlowSignals(period, instants, 4, BOUND)
+        # the force itself, what the vehicle's answer leaves of it, unscaled; the wheel
+        self._slow = SlowSignals(period, instants, 5, BOUND)
+        self._wheel = np.zeros(len(instants))
+        self._nodes = np.append(0.0, instants)
         self._yaw_decay = np.exp(-instants / 1.0)
         self._presence = 0.0
         self._last: Driver | None = None
@@ -71,24 +75,31 @@ class Vehicle:
         self._arrives(driver)
         scale = max(share, SMALLEST_SHARE)
         now = np.array([*stimulus.force[:2], stimulus.rates[2]]) / scale
-        if self._last is not None:
-            self._plant.follow(controls_of(self._last, stimulus.speed), now[:2], now[2])
-            at, ahead = self._plant.ahead()
+        at, ahead = np.zeros(3), np.zeros((len(out), 3))
+        last = self._last
+        steering = 0.0 if last is None else last.steering
+        if last is not None:
+            self._plant.follow(controls_of(last, stimulus.speed), now[:2], now[2])
+            at, ahead = self._plant.ahead(self._course(steering))
             ahead = at + np.clip(ahead - at, -RUNAWAY, RUNAWAY)
-        else:
-            at, ahead = np.zeros(3), np.zeros((len(out), 3))
-        slow = self._slow.predict(np.concatenate((now[:2], now[:2] - at[:2])))
+        told = self._slow.predict(np.array([*now[:2], *(now[:2] - at[:2]), steering]))
+        slow, self._wheel = told[:, :4], told[:, 4]
         decay = self._yaw_decay
         plain = np.column_stack((slow[:, :2], now[2] * decay))
         vehicle = ahead + np.column_stack((slow[:, 2:], (now[2] - at[2]) * decay))
         if not small:
             self._judge(now, plain, vehicle)
         trust = self.trust
-        told = plain + trust * (vehicle - plain)
-        out[:, SIGNALS] = told * scale
+        out[:, SIGNALS] = (plain + trust * (vehicle - plain)) * scale
         self._standstill.end(out[:, 0], stimulus)
         self._tell(small, trust)
         return out
+
+    def _course(self, steering: float) -> Array:
+        """Wheel angle one delay of the vehicle before each instant; forecast a period ago, (K,)."""
+        back = np.maximum(self._instants - self._plant.turn_delay, 0.0)
+        course: Array = np.interp(back, self._nodes, np.append(steering, self._wheel))
+        return course
 
     def _arrives(self, driver: Driver | None) -> None:
         step = self._period / COMES

@@ -114,7 +114,7 @@ def controls_of(driver: Driver, speed: float) -> Controls:
 
 
 class VehiclePlant:
-    """Longitudinal and lateral answer to held pedals and steering.
+    """Longitudinal and lateral answer to pedals and steering.
 
     Args:
         period: Time between two calls of `follow` [s].
@@ -133,7 +133,6 @@ class VehiclePlant:
         self._stride = max(1, round(SAMPLE / period))
         self._count = 0
         self._lagged = np.zeros((len(LAGS), 4))
-        # the measured signals pass the same lags, so that both sides are equally late
         self._wheel = np.zeros(len(TURN_LAGS))
         self._habit = np.zeros(2)
         self.surge = BoundedLeastSquares(
@@ -188,8 +187,16 @@ class VehiclePlant:
             self.turn.learn(np.tile(rows, (len(TURN_LAGS), 1)), self._wheel * unit)
             self.lean.learn(np.array([[controls.speed * yaw_rate]]) / 5.0, force[1:2] / 5.0)
 
-    def ahead(self) -> tuple[Array, Array]:
-        """Answer to the controls as they are now, held.
+    @property
+    def turn_delay(self) -> float:
+        """From the wheel to the yaw rate [s]."""
+        return DEAD_TIME + float(TURN_LAGS[self.turn.best])
+
+    def ahead(self, steering: Array) -> tuple[Array, Array]:
+        """Answer to the pedals as they are now, held, and to a course of the steering wheel.
+
+        Args:
+            steering: Wheel angle `turn_delay` before each instant, (K,) [rad].
 
         Returns:
             Now, (3,), and ahead, (K, 3): f_x, f_y [m/s2], yaw rate [rad/s].
@@ -205,13 +212,17 @@ class VehiclePlant:
         # no further than to standstill: a held brake does not drive backwards
         speed = np.maximum(speed, 0.0) if held.speed >= 0.0 else np.minimum(speed, 0.0)
         best = self.turn.best
-        ratio, understeer = self.turn.theta[best]
-        stiffness = max(ratio + understeer * held.speed**2, 0.3 * ratio)
         wheel_now = self._wheel[best]
         angle_now = wheel_now / held.speed if abs(held.speed) > SLOWEST else held.steering
-        angle = held.steering + (angle_now - held.steering) * self._turn_decay[:, best]
-        turn_now = wheel_now / stiffness
-        turn = speed * angle / np.maximum(ratio + understeer * speed**2, 0.3 * ratio)
+        angle = steering + (angle_now - held.steering) * self._turn_decay[:, best]
+        turn_now = wheel_now / self._wheel_per_turn(np.array(held.speed))
+        turn = speed * angle / self._wheel_per_turn(speed)
         lean = float(self.lean.theta[0, 0])
-        now = np.array([surge_now, lean * held.speed * turn_now, turn_now])
+        now = np.array([surge_now, lean * held.speed * float(turn_now), float(turn_now)])
         return now, np.column_stack((surge, lean * speed * turn, turn))
+
+    def _wheel_per_turn(self, speed: Array) -> Array:
+        ratio, understeer = self.turn.theta[self.turn.best]
+        # an oversteering fit has a critical speed: stay away from it
+        out: Array = np.maximum(ratio + understeer * speed**2, 0.3 * ratio)
+        return out

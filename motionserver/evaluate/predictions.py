@@ -132,7 +132,8 @@ def slow_force(drive: Recording) -> Array:
 
 def regular(recording: Recording) -> Recording:
     """The same drive with a sample in every period."""
-    times = np.arange(int(recording.duration / PERIOD + 1e-6) + 1) * PERIOD
+    count = int(recording.duration / PERIOD + 1e-6) + 1
+    times: Array = np.arange(count) * np.float64(PERIOD)
     columns = (*recording.force.T, *recording.rates.T, recording.speed)
     table = np.column_stack([np.interp(times, recording.times, column) for column in columns])
     return from_samples(recording.name, times, table[:, :3], table[:, 3:6], table[:, 6])
