@@ -1,9 +1,9 @@
-"""Surge, sway and yaw from what the driver does: the vehicle's answer, and the rest autoregressive.
+"""Surge, sway and yaw from what the driver does: the vehicle's answer, the rest autoregressive.
 
-Pedals and steering lead the motion by the vehicle's own delay. Pedals are held over the horizon. The
-wheel is not, for it swings back: its own autoregressive forecast takes 10 to 25 % off the error of
-sway that a held one makes (measured on a simulated drive). The model is trusted as far as it
-foretold the last seconds better than the autoregressive model alone; without controls, or with
+Pedals and steering lead the motion by the vehicle's own delay. Pedals are held over the horizon.
+The wheel is not, for it swings back: with its own autoregressive forecast the error of sway is 10
+to 25 % less than with a held one (measured on a simulated drive). The model is trusted as far as
+it foretold the last seconds better than the autoregressive model alone; without controls, or with
 controls that explain nothing, that model remains.
 """
 
