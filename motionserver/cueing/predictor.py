@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -54,7 +55,10 @@ def save(predictor: Predictor, path: Path) -> None:
         "surge": _rows(predictor.weights[0]),
         "sway": _rows(predictor.weights[1]),
     }
-    path.write_text(json.dumps(data, indent=1) + "\n", "utf-8")
+    text = json.dumps(data, indent=1)
+    # a row of numbers is one line
+    text = re.sub(r"\[[^][{}]*\]", lambda row: " ".join(row.group().split()), text)
+    path.write_text(text + "\n", "utf-8")
 
 
 def load(path: Path | Traversable) -> Predictor:

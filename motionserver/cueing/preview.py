@@ -45,7 +45,8 @@ class PreviewKeeper:
 
     def __init__(self, period: float, instants: Array) -> None:
         self.weight = 0.0
-        self._period, self._instants = period, instants
+        self._period, self._instants = period, np.append(0.0, instants)
+        self._join = np.exp(-instants / JOIN)[:, None]
         self._seen: Array | None = None
         self._kept: _Kept | None = None
         self._age = 0.0
@@ -98,21 +99,28 @@ class PreviewKeeper:
         factor = stimulus.share / kept.share if kept.share > NO_SHARE else 0.0
         table = kept.table * factor
         now = np.concatenate((stimulus.force, stimulus.rates))
-        instants = np.append(0.0, self._instants)
+        instants = self._instants
         end = float(kept.times[-1]) - self._age
         beyond = np.exp(-np.maximum(instants - end, 0.0) / END_FADE)
-        known = instants <= end
         base = np.concatenate((now[None], model))
-        told = np.empty_like(base)
-        for signal in range(base.shape[1]):
-            line = np.interp(instants + self._age, kept.times, table[:, signal])
-            last = np.interp(end, instants, base[:, signal])
-            later = base[:, signal] + (table[-1, signal] - last) * beyond
-            told[:, signal] = np.where(known, line, later)
-        join = np.exp(-self._instants / JOIN)[:, None]
-        out: Array = told[1:] + (now - told[0]) * join
+        last = _line(np.array([end]), instants, base)
+        later = base + (table[-1] - last) * beyond[:, None]
+        line = _line(instants + self._age, kept.times, table)
+        told = np.where((instants <= end)[:, None], line, later)
+        out: Array = told[1:] + (now - told[0]) * self._join
         return out
 
 
 def _towards(value: float, goal: float, step: float) -> float:
     return min(max(goal, value - step), value + step)
+
+
+def _line(at: Array, times: Array, table: Array) -> Array:
+    """Linear between the rows of a table (n, S), constant beyond, (len(at), S)."""
+    if len(times) < 2:
+        return np.repeat(table, len(at), axis=0)
+    left = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 2)
+    begin = times[left]
+    share = np.clip((at - begin) / (times[left + 1] - begin), 0.0, 1.0)[:, None]
+    out: Array = table[left] + share * (table[left + 1] - table[left])
+    return out

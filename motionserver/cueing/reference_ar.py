@@ -76,15 +76,26 @@ class SlowSignals:
     def __init__(
         self, period: float, instants: Array, signals: int, bound: float = LARGEST
     ) -> None:
-        self._instants, self._bound = instants, bound
+        self._bound = bound
         self.passed = LowPassed(period, signals)
         self._stride = self.passed.stride
         self._models = [AutoRegression(AR_ORDER) for _ in range(signals)]
         self._count = 0
         step = self._stride * period
-        self._steps = np.arange(int(np.ceil(instants[-1] / step)) + 2) * step
+        steps = np.arange(int(np.ceil(instants[-1] / step)) + 2) * step
+        # row: weights of the forecast's steps at one instant, linear between them
+        self._between: Array = np.column_stack(
+            [np.interp(instants, steps, unit) for unit in np.eye(len(steps))]
+        )
         self._rest_decay = np.exp(-instants / AR_REST_FADE)[:, None]
-        self._forecasts = [m.forecast_matrix(len(self._steps) - 1) for m in self._models]
+        self._maps: Array = np.stack([self._map(model) for model in self._models])
+
+    def _map(self, model: AutoRegression) -> Array:
+        """From the samples of the past to the instants, (K, order)."""
+        steps = self._between.shape[1]
+        rows = np.concatenate((np.eye(1, AR_ORDER), model.forecast_matrix(steps - 1)))
+        out: Array = self._between @ rows
+        return out
 
     def predict(self, now: Array) -> Array:
         """Take in the signals (S,) and look ahead: (K, S). Ignores what is no number."""
@@ -96,14 +107,10 @@ class SlowSignals:
             # signals learn in different ticks, so that none is much longer than the rest
             if (self._count + signal * self._stride // signals) % self._stride == 0:
                 model.learn(sampled[1:, signal], float(sampled[0, signal]))
-                self._forecasts[signal] = model.forecast_matrix(len(self._steps) - 1)
-        out = np.empty((len(self._instants), signals))
-        for signal in range(signals):
-            newest = sampled[:-1, signal]
-            ahead = np.concatenate((newest[:1], self._forecasts[signal] @ newest))
-            out[:, signal] = np.interp(self._instants, self._steps, ahead)
+                self._maps[signal] = self._map(model)
+        ahead = (self._maps @ sampled[:-1].T[:, :, None])[:, :, 0].T
         rest = (now - self.passed.slow) * self._rest_decay
-        forecast: Array = np.clip(out, -self._bound, self._bound) + rest
+        forecast: Array = np.clip(ahead, -self._bound, self._bound) + rest
         return forecast
 
 

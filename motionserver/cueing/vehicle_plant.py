@@ -37,6 +37,8 @@ REFERENCE_SPEED: Final = 30.0
 """Drag is told at this speed [m/s]."""
 SLOWEST: Final = 2.0
 """Below this speed nothing lateral is learnt [m/s]."""
+GRIP: Final = 12.0
+"""Largest lateral acceleration a model without tyres' limits may claim [m/s2]."""
 LEAST_TURN: Final = 0.01
 """Nor below this yaw rate [rad/s]."""
 LEAST_CHANGE: Final = 0.02
@@ -215,8 +217,8 @@ class VehiclePlant:
         wheel_now = self._wheel[best]
         angle_now = wheel_now / held.speed if abs(held.speed) > SLOWEST else held.steering
         angle = steering + (angle_now - held.steering) * self._turn_decay[:, best]
-        turn_now = wheel_now / self._wheel_per_turn(np.array(held.speed))
-        turn = speed * angle / self._wheel_per_turn(speed)
+        turn_now = _gripped(wheel_now / self._wheel_per_turn(np.array(held.speed)), held.speed)
+        turn = _gripped(speed * angle / self._wheel_per_turn(speed), speed)
         lean = float(self.lean.theta[0, 0])
         now = np.array([surge_now, lean * held.speed * float(turn_now), float(turn_now)])
         return now, np.column_stack((surge, lean * speed * turn, turn))
@@ -226,3 +228,10 @@ class VehiclePlant:
         # an oversteering fit has a critical speed: stay away from it
         out: Array = np.maximum(ratio + understeer * speed**2, 0.3 * ratio)
         return out
+
+
+def _gripped(turn: Array, speed: Array | float) -> Array:
+    """Yaw rates no larger than tyres allow at these speeds."""
+    most = GRIP / np.maximum(np.abs(speed), SLOWEST)
+    out: Array = np.clip(turn, -most, most)
+    return out
