@@ -80,6 +80,11 @@ class PreviewKeeper:
         told = self._told(kept, model, stimulus)
         return model + self.weight * (told - model)
 
+    @property
+    def end(self) -> float:
+        """How far from now the last preview goes [s]; below 0 if used up or never told."""
+        return -1.0 if self._kept is None else float(self._kept.times[-1]) - self._age
+
     def _goal(self) -> float:
         if self._kept is None:
             return 0.0
@@ -100,7 +105,7 @@ class PreviewKeeper:
         table = kept.table * factor
         now = np.concatenate((stimulus.force, stimulus.rates))
         instants = self._instants
-        end = float(kept.times[-1]) - self._age
+        end = self.end
         beyond = np.exp(-np.maximum(instants - end, 0.0) / END_FADE)
         base = np.concatenate((now[None], model))
         last = _line(np.array([end]), instants, base)

@@ -101,17 +101,32 @@ class Reference:
                 "change tuning.reference"
             )
         self.model = model
+        self._lead = lead
         instants = times + lead
         self._axes = _MAKERS[model](period, instants, predictor)
         self._preview = PreviewKeeper(period, instants)
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array | None = None) -> Array:
         """Take in the newest stimulus and look ahead: (K, 6) [m/s2, rad/s].
 
         To be called once in every period with what `believable` let through: the models count
         time by these calls.
+
+        Args:
+            stimulus: What should be felt now.
+            turning: How the vehicle turns, (3,) [rad/s], if the stimulus holds only a part of it
+                (high-passed, say); models of the vehicle learn from this.
         """
-        return self._preview.blend(self._axes.predict(stimulus), stimulus)
+        rates = stimulus.rates if turning is None else turning
+        return self._preview.blend(self._axes.predict(stimulus, rates), stimulus)
+
+    @property
+    def known(self) -> float:
+        """How far after the hand-over a preview tells the future rather than a model [s].
+
+        0 while its weight is not whole.
+        """
+        return max(0.0, self._preview.end - self._lead) if self._preview.weight >= 1.0 else 0.0
 
     def describe(self) -> str:
         """What the forecast rests on now, in a few words for people."""

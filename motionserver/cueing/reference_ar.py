@@ -123,7 +123,7 @@ class Autoregressive:
         self._slow = SlowSignals(period, instants, 2)
         self._standstill = Standstill(instants)
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array) -> Array:
         """Look ahead; see `AxisModel.predict`."""
         out = self._decay.of(stimulus)
         out[:, :2] = self._slow.predict(stimulus.force[:2])

@@ -26,11 +26,13 @@ class AxisModel(Protocol):
 
     status: str
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array) -> Array:
         """Take in the newest stimulus and look ahead.
 
         Args:
             stimulus: Finite and within bounds, see `reference.believable`.
+            turning: How the vehicle turns, scaled alike, where the stimulus holds only the part
+                of its rates that is to be shown, (3,) [rad/s].
 
         Returns:
             Specific force minus g e_z (3), body rates (3) at the model's instants, (K, 6)

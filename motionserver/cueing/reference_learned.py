@@ -43,11 +43,11 @@ class Features:
         self._rates = LowPassed(period, 2)
         self._standstill = Standstill(instants)
 
-    def take(self, stimulus: Stimulus) -> Array:
-        """Take in a stimulus; the base forecast of surge and sway, (K, 2)."""
+    def take(self, stimulus: Stimulus, turning: Array) -> Array:
+        """Take in a stimulus and rates; the base forecast of surge and sway, (K, 2)."""
         base = self._slow.predict(stimulus.force[:2])
         self._standstill.end(base[:, 0], stimulus)
-        self._rates.take(stimulus.rates[1:])
+        self._rates.take(turning[1:])
         return base
 
     def row(self, axis: int, stimulus: Stimulus) -> Array:
@@ -82,10 +82,10 @@ class Learned:
                 column = known[axis, :, feature]
                 self._weights[axis, :, feature] = np.interp(instants, horizons, column)
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array) -> Array:
         """Look ahead; see `AxisModel.predict`."""
         out = self._decay.of(stimulus)
-        base = self._features.take(stimulus)
+        base = self._features.take(stimulus, turning)
         for axis in range(2):
             weights = self._weights[axis]
             ahead = base[:, axis] * (1.0 + weights[:, 0])

@@ -21,7 +21,7 @@ class Constant:
         self.status = "constant"
         self._decay = Decay(instants, force_fade)
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array) -> Array:
         """Look ahead; see `AxisModel.predict`."""
         return self._decay.of(stimulus)
 

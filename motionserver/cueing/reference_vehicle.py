@@ -33,8 +33,6 @@ PRIOR: Final = np.array([0.05, 0.05, 1e-3])
 """Squared errors taken as given at first: nobody is better [m2/s4, m2/s4, rad2/s2]."""
 RUNAWAY: Final = np.array([15.0, 15.0, 3.0])
 """Largest difference from now that the vehicle's answer may make [m/s2, m/s2, rad/s]."""
-SIGNALS: Final = (0, 1, 5)
-"""Surge, sway, yaw rate among the six."""
 
 
 class Vehicle:
@@ -66,7 +64,7 @@ class Vehicle:
         out: Array = plain**2 / (plain**2 + vehicle**2) * self._presence
         return out
 
-    def predict(self, stimulus: Stimulus) -> Array:
+    def predict(self, stimulus: Stimulus, turning: Array) -> Array:
         """Look ahead; see `AxisModel.predict`."""
         out = self._decay.of(stimulus)
         share = stimulus.share
@@ -74,7 +72,7 @@ class Vehicle:
         driver = None if small else stimulus.driver
         self._arrives(driver)
         scale = max(share, SMALLEST_SHARE)
-        now = np.array([*stimulus.force[:2], stimulus.rates[2]]) / scale
+        now = np.array([*stimulus.force[:2], turning[2]]) / scale
         at, ahead = np.zeros(3), np.zeros((len(out), 3))
         last = self._last
         steering = 0.0 if last is None else last.steering
@@ -90,7 +88,10 @@ class Vehicle:
         if not small:
             self._judge(now, plain, vehicle)
         trust = self.trust
-        out[:, SIGNALS] = (plain + trust * (vehicle - plain)) * scale
+        differs = trust * (vehicle - plain) * scale
+        out[:, :2] = plain[:, :2] * scale + differs[:, :2]
+        # yaw fades as shown, plus what the vehicle's answer adds to a fade
+        out[:, 5] += differs[:, 2]
         self._standstill.end(out[:, 0], stimulus)
         self._tell(small, trust)
         return out

@@ -108,7 +108,7 @@ def _condense(recording: Recording) -> _Sums:
     last = round(horizons[-1] / PERIOD)
     base, rows = [], []
     for k, stimulus in enumerate(stimuli_of(drive)):
-        forecast = features.take(stimulus)
+        forecast = features.take(stimulus, stimulus.rates)
         if k >= begin and k % EVERY == 0 and k + last < len(came):
             base.append(forecast)
             rows.append([features.row(axis, stimulus) for axis in range(2)])

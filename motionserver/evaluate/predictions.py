@@ -86,7 +86,8 @@ def predictions(
 
 def errors_of(recording: Recording, predictor: Predictor, horizons: Array) -> Array:
     """Relative errors of the model "learned" with a predictor that need not be shipped, (2, K)."""
-    return forecast_errors(recording, Learned(PERIOD, horizons, predictor).predict, horizons)
+    model = Learned(PERIOD, horizons, predictor)
+    return forecast_errors(recording, lambda one: model.predict(one, one.rates), horizons)
 
 
 def forecast_errors(

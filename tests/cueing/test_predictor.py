@@ -32,7 +32,8 @@ def drive(model, scale=1.0, mirror=1.0, count=300, seed=1):
     for k in range(count):
         signs = np.array([1, mirror, 1, mirror, 1, mirror])
         wanted = scale * walk[k] * signs
-        out = model.predict(Stimulus(wanted[:3], wanted[3:], share=scale, speed=12.0))
+        one = Stimulus(wanted[:3], wanted[3:], share=scale, speed=12.0)
+        out = model.predict(one, one.rates)
     return out
 
 

@@ -63,6 +63,19 @@ def test_a_preview_told_seldom_is_followed_all_the_time():
         assert out[:, 0] == pytest.approx(wave(k * PERIOD + INSTANTS)[0][:, 0], abs=0.03)
 
 
+def test_how_far_the_future_is_known():
+    model = Reference("constant", PERIOD, INSTANTS, 0.1)
+    assert model.known == 0.0
+    model.predict(stimulus(0.0, told(0.0, 2.0)))
+    assert model.known == pytest.approx(1.9)
+    for k in range(1, 21):
+        model.predict(stimulus(k * PERIOD, None))
+    assert model.known == pytest.approx(1.7)
+    for k in range(21, 41):
+        model.predict(stimulus(k * PERIOD, None))
+    assert model.known == 0.0
+
+
 def test_another_share_since_it_was_told():
     model = Reference("constant", PERIOD, INSTANTS, 0.0)
     model.predict(stimulus(0.0, told(0.0, share=0.5), 0.5))

@@ -65,6 +65,18 @@ def test_the_parameters_become_those_of_the_car(car):
     assert drag >= 0.0
 
 
+def test_it_learns_from_all_of_the_turning_though_only_its_onset_is_shown(car):
+    whole, onset = (Reference("vehicle", 0.01, HORIZONS, 0.0) for _ in range(2))
+    for one in list(stimuli(car))[:1500]:
+        told = whole.predict(one)
+        shown = Stimulus(
+            one.force, 0.0 * one.rates, share=one.share, speed=one.speed, driver=one.driver
+        )
+        part = onset.predict(shown, one.rates)
+    assert part[:, :2] == pytest.approx(told[:, :2])
+    assert part[:, 5] == pytest.approx(told[:, 5] - one.rates[2] * np.exp(-HORIZONS))
+
+
 def test_a_wheel_with_the_wrong_sign_is_not_trusted(car):
     model = Reference("vehicle", 0.01, HORIZONS, 0.0)
     truth = 0.6 * np.concatenate(car[:2], axis=1)
