@@ -36,10 +36,12 @@ EVERY: Final = 5
 """Every so many samples one row: neighbours say the same."""
 SHORTEST: Final = 10.0
 """A recording, or a part of one, shorter than this is not fitted to [s]."""
+SCALE: Final = 0.5
+"""The drives are fitted as they are shown: forecasts of a shown force are bounded."""
 PARTS: Final = 4
 """Parts of a single recording, of which one is left out in turn."""
-FLOOR: Final = 0.06
-"""An axis more quiet than this counts less than the others [m/s2]."""
+FLOOR: Final = 0.03
+"""An axis shown more quietly than this counts less than the others [m/s2]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +75,14 @@ def fit(recordings: Sequence[Recording], name: str, note: str = "") -> Predictor
     """
     if not recordings:
         raise ValueError("no recordings to fit to; give at least one")
-    parts = _in_parts(recordings[0]) if len(recordings) == 1 else list(recordings)
-    for part in parts:
-        if part.duration < SHORTEST:
+    parts = PARTS if len(recordings) == 1 else 1
+    for recording in recordings:
+        if recording.duration < parts * SHORTEST:
             raise ValueError(
-                f"recording {part.name}: {part.duration:.1f} s is too short to fit to; "
-                f"each part needs {SHORTEST:g} s"
+                f"recording {recording.name}: {recording.duration:.1f} s is too short to fit to; "
+                f"it needs {parts * SHORTEST:g} s"
             )
-    sums = [_condense(part) for part in parts]
+    sums = [one for recording in recordings for one in _condense(recording, parts)]
     everything = list(range(len(sums)))
     one_vehicle = len(recordings) == 1 or len(recordings) >= ENOUGH
     extras = EXTRAS if one_vehicle else (WITHOUT,)
@@ -94,36 +96,40 @@ def fit(recordings: Sequence[Recording], name: str, note: str = "") -> Predictor
     )
 
 
-def _in_parts(recording: Recording) -> list[Recording]:
-    ends = np.linspace(0.0, recording.duration, PARTS + 1)
-    return [recording.excerpt(a, b) for a, b in itertools.pairwise(ends)]
-
-
-def _condense(recording: Recording) -> _Sums:
+def _condense(recording: Recording, parts: int) -> list[_Sums]:
+    """Sums of a recording, or of its parts; the forecasts learn through all of them."""
     drive = regular(recording)
     horizons = np.array(FIT_HORIZONS)
-    came = slow_force(drive)
+    came = SCALE * slow_force(drive)
     features = Features(PERIOD, horizons)
-    begin = round(SETTLE / PERIOD)
-    last = round(horizons[-1] / PERIOD)
     base, rows = [], []
-    for k, stimulus in enumerate(stimuli_of(drive)):
+    for k, stimulus in enumerate(stimuli_of(drive, SCALE)):
         forecast = features.take(stimulus, stimulus.rates)
-        if k >= begin and k % EVERY == 0 and k + last < len(came):
+        if k % EVERY == 0:
             base.append(forecast)
             rows.append([features.row(axis, stimulus) for axis in range(2)])
     table, bases = np.array(rows), np.array(base)
-    at = np.arange(begin + -begin % EVERY, len(came) - last, EVERY)
-    shape = (2, len(horizons))
+    edges = np.linspace(round(SETTLE / PERIOD), len(came), parts + 1).astype(int)
+    last = round(horizons[-1] / PERIOD)
+    out = []
+    for begin, end in itertools.pairwise(edges):
+        # what is foretold lies in the same part, so that no part has seen another
+        at = np.arange(begin + -begin % EVERY, end - last, EVERY)
+        out.append(_sums(recording.name, came, at, bases[at // EVERY], table[at // EVERY]))
+    return out
+
+
+def _sums(name: str, came: Array, at: Array, bases: Array, table: Array) -> _Sums:
+    shape = (2, len(FIT_HORIZONS))
     sums = _Sums(
-        recording.name,
+        name,
         np.zeros((*shape, FEATURES, FEATURES)),
         np.zeros((*shape, FEATURES)),
         np.zeros(shape),
     )
     for axis in range(2):
-        unit = np.sqrt(np.mean(came[:, axis] ** 2) + FLOOR**2)
-        for m, horizon in enumerate(horizons):
+        unit = np.sqrt(np.mean(came[at, axis] ** 2) + FLOOR**2)
+        for m, horizon in enumerate(FIT_HORIZONS):
             x = np.column_stack((bases[:, m, axis], table[:, axis])) / unit
             y = (came[at + round(horizon / PERIOD), axis] - bases[:, m, axis]) / unit
             sums.moment[axis, m] = x.T @ x / len(y)
