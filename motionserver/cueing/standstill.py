@@ -1,7 +1,7 @@
 """What braking cannot do: a vehicle that has come to stand decelerates no further.
 
-On recorded drives this is worth more than any statistics: 12 % of the forecast error of surge two
-seconds ahead on a drive with two stops, nothing where nobody stops.
+On recorded drives this is worth more than any statistics: a fifth of the forecast error of surge
+two seconds ahead on a drive with two stops, nothing where nobody stops.
 """
 
 from __future__ import annotations
