@@ -18,8 +18,17 @@ import motionserver
 from motionserver.errors import ConfigError
 from motionserver.evaluate.tune.outcome import Job, Outcome
 
-_ROOMS: Final = ("core", "cueing", "solvers", "evaluate/metrics", "evaluate/tune")
-_FILES: Final = ("evaluate/lockstep.py", "evaluate/drive.py", "evaluate/recording.py")
+_SOURCES: Final = (
+    "core/**/*.py",
+    "cueing/**/*.py",
+    "solvers/**/*.py",
+    "evaluate/*.py",
+    "evaluate/metrics/*.py",
+    "evaluate/tune/outcome.py",
+    "evaluate/tune/sickness.py",
+    "evaluate/tune/stretches.py",
+    "presets/predictors/*.json",
+)
 _LIBRARIES: Final = ("numpy", "scipy", "daqp", "osqp", "piqp", "hpipm-python")
 
 
@@ -96,11 +105,8 @@ def key_of(job: Job) -> str:
 def code_digest() -> str:
     """Hash of the source that turns a recording into figures, and of the libraries' versions."""
     root = Path(motionserver.__file__).parent
-    paths = [root / name for name in _FILES]
-    for room in _ROOMS:
-        paths += sorted((root / room).rglob("*.py"))
     text = hashlib.sha256()
-    for path in paths:
+    for path in (path for pattern in _SOURCES for path in sorted(root.glob(pattern))):
         text.update(path.relative_to(root).as_posix().encode())
         text.update(path.read_bytes())
     for name in _LIBRARIES:

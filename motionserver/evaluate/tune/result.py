@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final
 
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
@@ -12,6 +13,9 @@ from motionserver.evaluate.tune.outcome import Outcome
 from motionserver.evaluate.tune.space import Parameter, Value
 from motionserver.evaluate.tune.stretches import Stretch
 from motionserver.settings.tuning import TuningModel, apply_changes
+
+NOTICEABLE: Final = 0.01
+"""Least gain over the defaults that is called one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +136,8 @@ class TuneResult:
 
     @property
     def pays(self) -> bool:
-        """Whether choosing like this beats the defaults on recordings it has not seen."""
-        return self.held_out_score < self.score(self.default)
+        """Whether choosing like this beats the defaults, noticeably, on drives it has not seen."""
+        return self.held_out_score < (1.0 - NOTICEABLE) * self.score(self.default)
 
     @property
     def held_out_violations(self) -> int:

@@ -56,7 +56,8 @@ def verdict(result: TuneResult) -> list[str]:
     count = len(result.folds)
     lines = [
         f"{criterion.name} on recordings not looked at: {held:.3f}, with the defaults "
-        f"{default:.3f} ({abs(won):.1f} % {'less' if won >= 0.0 else 'MORE'}); better on {better} of {count}",
+        f"{default:.3f} ({abs(won):.1f} % {'less' if won >= 0.0 else 'MORE'}); "
+        f"better on {better} of {count}",
         f"on the very recordings it was chosen on it is {inside:.3f}: the difference, "
         f"{held - inside:+.3f}, is what choosing flatters",
     ]
@@ -66,7 +67,7 @@ def verdict(result: TuneResult) -> list[str]:
         lines.append("the preset is worth trying: choosing like this helps on unseen drives")
     else:
         lines.append(
-            "KEEP THE DEFAULTS: on unseen drives choosing like this does not help, whatever the "
+            "KEEP THE DEFAULTS: on unseen drives choosing like this brings nothing, whatever the "
             "preset promises on the recordings it was chosen on"
         )
     if result.held_out_violations:
