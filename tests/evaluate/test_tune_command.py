@@ -2,6 +2,7 @@
 
 import json
 import re
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -178,6 +179,15 @@ def test_a_drive_without_force_is_refused(tmp_path):
         tune([silent, DRIVES[0]], out=tmp_path, **ASKED)
 
 
+def test_a_stop_from_the_keyboard_is_left_to_the_parent():
+    asked = signal.getsignal(signal.SIGINT)
+    try:
+        driving._leave_ctrl_c()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, asked)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -189,7 +199,7 @@ def test_a_drive_without_force_is_refused(tmp_path):
         ({"excerpt": float("nan")}, "--excerpt"),
         ({"planner_hz": 500.0}, "--planner-rate: 500 Hz"),
         ({"scale": 0.0}, "--scale"),
-        ({"jobs": 0}, "--jobs"),
+        ({"jobs": -1}, "--jobs"),
     ],
 )
 def test_wrong_arguments_are_refused(change, message, tmp_path):

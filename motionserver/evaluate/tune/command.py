@@ -46,7 +46,7 @@ def tune(
     search_scale: bool = False,
     tilt_rate_deg_s: float = 3.0,
     sickness_weight: float = SICKNESS_WEIGHT,
-    jobs: int = 1,
+    jobs: int = 0,
     progress: Progress | None = None,
 ) -> TuneResult:
     """Search tunables of one algorithm on recordings and write down what was found and why.
@@ -71,7 +71,8 @@ def tune(
         search_scale: Whether the scale the algorithm is asked for is searched too.
         tilt_rate_deg_s: Perception threshold of tilt coordination [deg/s].
         sickness_weight: Of the criterion "sickness" [s2/m].
-        jobs: Processes; the result does not depend on it.
+        jobs: Processes that drive at the same time, 0 for this one; the result does not depend on
+            it.
         progress: Called after every drive.
 
     Returns:
@@ -173,7 +174,7 @@ def _check(
         ("--trials", trials, 2, 2000, ""),
         ("--refine", refine, 0, 500, ""),
         ("--seed", seed, 0, 2**31 - 1, ""),
-        ("--jobs", jobs, 1, 256, ""),
+        ("--jobs", jobs, 0, 256, ""),
         ("--planner-rate", planner_hz, 20, 250, " Hz"),
         ("--scale", scale, 0.05, 1, ""),
         ("--excerpt", excerpt, 0, 1e5, " s"),

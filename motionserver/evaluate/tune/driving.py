@@ -1,9 +1,10 @@
-"""Drive many jobs, in several processes, each at most once."""
+"""Drive many jobs, in processes of their own, each at most once."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -27,6 +28,13 @@ def drive_all(
     """Outcomes of all jobs in their order; what is in the cache is not driven again.
 
     The result depends neither on the number of processes nor on what finishes first.
+
+    Args:
+        jobs: What to drive.
+        cache: What is known already; new outcomes are put there at once.
+        processes: That drive at the same time; 0 drives in this one.
+        label: Of this part of the work.
+        progress: Called at the beginning and after every drive.
     """
     keys = [key_of(job) for job in jobs]
     missing = {k: job for k, job in zip(keys, jobs, strict=True) if cache.get(k) is None}
@@ -43,12 +51,13 @@ def drive_all(
 
 
 def _run(jobs: dict[str, Job], processes: int) -> Iterator[tuple[str, Outcome]]:
-    if processes <= 1 or len(jobs) < 2:
+    if processes == 0 or not jobs:
         for key, job in jobs.items():
             yield key, run(job)
         return
     context = multiprocessing.get_context("spawn")
-    with _one_thread_each(), ProcessPoolExecutor(min(processes, len(jobs)), context) as pool:
+    count = min(processes, len(jobs))
+    with _one_thread_each(), ProcessPoolExecutor(count, context, _leave_ctrl_c) as pool:
         keys = {pool.submit(run, job): key for key, job in jobs.items()}
         try:
             for future in as_completed(keys):
@@ -60,7 +69,7 @@ def _run(jobs: dict[str, Job], processes: int) -> Iterator[tuple[str, Outcome]]:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Children inherit it: matrices here are small, and threads of several only collide."""
+    """Let children inherit it: a second thread for such small matrices tripled their time."""
     before = {name: os.environ.get(name) for name in _THREADS}
     os.environ.update({name: "1" for name in _THREADS if before[name] is None})
     try:
@@ -69,3 +78,8 @@ def _one_thread_each() -> Iterator[None]:
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)
+
+
+def _leave_ctrl_c() -> None:
+    """The parent is told as well, and ends the children in order."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -21,7 +21,7 @@ _STYLE: Final = """
 .dots path{stroke:var(--line);fill:none}.dot{fill:var(--c1);opacity:.75}
 .out{fill:var(--c0);opacity:.5}
 .was{fill:none;stroke:var(--c2);stroke-width:2.5}.now{fill:none;stroke:var(--good);stroke-width:2.5}
-pre{overflow-x:auto;font:13px ui-monospace,monospace;margin:0}
+td:first-child{white-space:nowrap}pre{overflow-x:auto;font:13px ui-monospace,monospace;margin:0}
 """
 
 
@@ -29,7 +29,7 @@ def to_html(result: TuneResult) -> str:
     """The whole page; it needs nothing but itself."""
     title, *more = facts(result)
     said = "".join(f"<p>{escape(line)}.</p>" for line in verdict(result))
-    parts = "".join(_table(table) for table in tables(result))
+    parts = "".join(table_html(table) for table in tables(result))
     dots = "".join(_dots(result, parameter) for parameter in result.settings.space)
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
@@ -40,7 +40,7 @@ def to_html(result: TuneResult) -> str:
         + f"{_cards(result)}{said}{parts}<h2>Every trial</h2>"
         '<p class="soft">Mean score over each tunable: blue in the running, grey out of it, orange '
         f'ring the default, green ring the choice.</p><div class="frame dots">{dots}</div>'
-        f"{_table(trials_table(result))}<h2>{escape(preset_name(result))}.toml</h2>"
+        f"{table_html(trials_table(result))}<h2>{escape(preset_name(result))}.toml</h2>"
         f'<div class="frame"><pre>{escape(preset_text(result))}</pre></div>'
         f'<h2>Again</h2><div class="frame"><pre>{escape(result.command)}</pre></div>'
         "</body></html>\n"
@@ -73,7 +73,8 @@ def _cards(result: TuneResult) -> str:
     )
 
 
-def _table(table: Table) -> str:
+def table_html(table: Table) -> str:
+    """One table with its heading and note."""
     head = "".join(f"<th>{escape(cell)}</th>" for cell in table.head)
     rows = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows

@@ -27,12 +27,13 @@ def to_text(result: TuneResult) -> str:
     """Everything, aligned."""
     lines = [*facts(result), "", *verdict(result), ""]
     for table in (*tables(result), trials_table(result)):
-        lines += [table.title, *_aligned(table), *([table.note] if table.note else []), ""]
+        lines += [table.title, *aligned(table), *([table.note] if table.note else []), ""]
     lines += [f"preset: {preset_name(result)}.toml", "again:", f"  {result.command}"]
     return "\n".join(lines) + "\n"
 
 
-def _aligned(table: Table) -> list[str]:
+def aligned(table: Table) -> list[str]:
+    """Lines of a table, columns aligned."""
     rows = (table.head, *table.rows)
     widths = [max(len(row[i]) for row in rows) for i in range(len(table.head))]
     return [

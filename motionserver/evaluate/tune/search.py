@@ -36,7 +36,7 @@ class Search:
         stretches: What is driven.
         settings: What is searched.
         cache: Results so far.
-        processes: That drive at the same time.
+        processes: That drive at the same time; 0 drives in this one.
         progress: Called after every drive.
     """
 
@@ -46,7 +46,7 @@ class Search:
         stretches: tuple[Stretch, ...],
         settings: Settings,
         cache: ResultCache,
-        processes: int = 1,
+        processes: int = 0,
         progress: Progress | None = None,
     ) -> None:
         self._machine = machine

@@ -184,7 +184,7 @@ def _matters(result: TuneResult) -> Table:
         )  # fmt: skip
         rows.append(
             (item.parameter.name, _or_dash(item.correlation, "+.2f"), f"{item.spread:.3f}",
-             "  ".join(levels), word)
+             "; ".join(levels), word)
         )  # fmt: skip
     return Table(
         "What matters",
