@@ -7,9 +7,12 @@ and each fold only looks at other columns of the same table.
 It is exact because the pool is a quasi-random sequence that knows no recording. A sampler that
 learns from the scores would have seen the held-out recording through the trials it proposed, unless
 each fold had a study of its own and drove its own trials: as many times the work as there are
-recordings, for six tunables and tens of trials, where learning samplers gain little over an even
-spread. The second phase does learn, and so it is one per fold: trials near the fold's best, which
-depend on the other recordings only. Folds that agree about the best share their trials.
+recordings, and tens of trials in six tunables are few to learn from. The second phase does learn,
+and so it is one per fold: trials near the fold's best, which depend on the other recordings only.
+Folds that agree about the best share their trials.
+
+The sequence is drawn by scipy, which the server has anyway; a framework for learning samplers comes
+with a database and half a dozen packages, for what a file of lines does here.
 """
 
 from __future__ import annotations
