@@ -51,11 +51,28 @@ def run(
 
 
 @app.command()
-def check(config: ConfigFile) -> None:
-    """Validate a configuration and show what it means."""
-    from motionserver.cli.serving import describe
+def check(
+    config: Annotated[
+        Path | None, typer.Argument(help="configuration, TOML", metavar="CONFIG.toml")
+    ] = None,
+    platform: Annotated[
+        str | None,
+        typer.Option("--platform", help="a machine alone: preset or file", metavar="PRESET|FILE"),
+    ] = None,
+    html_out: Annotated[
+        Path | None, typer.Option("--html", help="draw the workspace as a page", metavar="OUT")
+    ] = None,
+    svg_out: Annotated[
+        Path | None, typer.Option("--svg", help="draw its planes as a picture", metavar="OUT")
+    ] = None,
+    json_out: Annotated[
+        Path | None, typer.Option("--json", help="write all its figures", metavar="OUT")
+    ] = None,
+) -> None:
+    """Validate a configuration, show what it means and what its machine reaches."""
+    from motionserver.cli.workspace import check_text
 
-    typer.echo(describe(config))
+    typer.echo(check_text(config, platform, html_out, svg_out, json_out))
 
 
 @app.command()

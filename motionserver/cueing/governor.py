@@ -13,7 +13,7 @@ from motionserver.core.plan import FIRST_STEP, KNOT_STEP, Plan
 from motionserver.core.safety.verdict import Rejection
 from motionserver.cueing.base import Candidate
 
-KAPPAS: Final = (1.0, 0.5, 0.25, 0.125, 0.0625)
+KAPPAS: Final = tuple(0.5**halving for halving in range(8))
 
 
 @dataclass(frozen=True, slots=True)

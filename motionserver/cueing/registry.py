@@ -9,6 +9,7 @@ from typing import Final
 from motionserver.core.limits import Machine
 from motionserver.cueing.base import Cueing
 from motionserver.cueing.classical import Classical
+from motionserver.cueing.mpc import SixAxis
 from motionserver.cueing.thondel import Thondel
 from motionserver.cueing.tuning import Tuning
 
@@ -18,6 +19,7 @@ Maker = Callable[[Machine, Tuning, float], Cueing]
 GROUP: Final = "motionserver.cueing"
 """Entry-point group of third parties; each entry names a `Maker`."""
 BUILT_IN: Final[dict[str, Maker]] = {
+    SixAxis.name: SixAxis,
     Classical.name: Classical,
     Thondel.name: Thondel,
 }

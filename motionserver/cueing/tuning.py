@@ -43,6 +43,8 @@ class Tuning:
         mpc_weight_position: Weight of being away from neutral, surge and sway, per m2.
         mpc_weight_attitude: The same of roll and pitch, per rad2.
         mpc_weight_tilt_rate: Price of exceeding tilt_rate, in units of it.
+        mpc_trust: How far a reference model is believed: weights of the error fall to 1/e at
+            that time after the last thing known [s].
         perception: Weighting of the error: "none", "telban-cardullo" or "reid-nahon".
     """
 
@@ -73,6 +75,7 @@ class Tuning:
     mpc_weight_position: float = 0.1
     mpc_weight_attitude: float = 0.05
     mpc_weight_tilt_rate: float = 2.0
+    mpc_trust: float = 1.0
     perception: str = "none"
 
 

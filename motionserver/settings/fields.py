@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from motionserver.errors import MotionServerError
 
-BUILT_IN_ALGORITHMS: Final = ("thondel2014", "classical")
+BUILT_IN_ALGORITHMS: Final = ("mpc", "thondel2014", "classical")
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ _SI_NAMES: Final = {
     "tilt_acceleration_deg_s2": "tilt_acceleration",
     "translation_threshold_m_s2": "translation_threshold",
     "horizon_s": "horizon",
+    "mpc_trust_s": "mpc_trust",
 }
 _ROUNDING: Final = 1e-9
 """Slack of a box against the machine's, for degrees that came from radians."""
@@ -194,6 +195,11 @@ class TuningModel(BaseModel):
         _START.mpc_weight_tilt_rate, 100.0, "Tilt rate weight",
         "Price of tilting faster than the tilt rate.",
         "tilting stays below the threshold, sustained forces arrive later",
+    )
+    mpc_trust_s: float = number(
+        _START.mpc_trust, 0.2, 20.0, "s", group="Six axes", label="Trust",
+        meaning="How far ahead a prediction is believed; a preview is believed to its end.",
+        more="smoother, earlier preparation; weaker onsets",
     )
     perception: Literal["none", "telban-cardullo", "reid-nahon"] = choice(
         _START.perception, group="Six axes", label="Perception",

@@ -1,0 +1,51 @@
+"""check: what a configuration means, and what its machine reaches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from motionserver.cli.serving import describe
+from motionserver.core.limits import machine_from_mapping
+from motionserver.errors import ConfigError
+from motionserver.evaluate.workspace.command import workspace_text
+from motionserver.settings.config import load_config, run_dir_of
+from motionserver.settings.machine import load_machine
+from motionserver.settings.resolve import resolve
+from motionserver.settings.tuning import apply_changes, default_for
+from motionserver.settings.tuning_presets import PresetShelf
+
+
+def check_text(
+    path: Path | None,
+    platform: str | None,
+    html_out: Path | None,
+    svg_out: Path | None,
+    json_out: Path | None,
+) -> str:
+    """A configuration, or a machine alone, for people.
+
+    Raises:
+        ConfigError: Neither or both are given, or something in them is wrong.
+    """
+    if (path is None) == (platform is None):
+        raise ConfigError(
+            "check",
+            "neither a configuration nor a platform" if path is None else "two machines",
+            "Give CONFIG.toml, or --platform with a preset's name or a machine's .toml file.",
+        )
+    if path is None:
+        assert platform is not None
+        machine = load_machine(platform)
+        model, shelf = default_for(machine), None
+        head = [f"{platform}: valid, limits {machine.digest}"]
+    else:
+        config = load_config(path)
+        resolved = resolve(config, run_dir_of(config))
+        machine = machine_from_mapping(resolved["machine"])
+        model = apply_changes(default_for(machine), resolved["planner"]["tuning"])
+        shelf = PresetShelf(Path(resolved["web"]["presets_dir"]))
+        head = [describe(path)]
+    text = workspace_text(
+        machine, model, shelf, html_out=html_out, svg_out=svg_out, json_out=json_out
+    )
+    return "\n".join([*head, "", text])

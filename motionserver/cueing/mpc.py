@@ -1,0 +1,208 @@
+"""Motion cueing by model predictive control on all six axes of the hexapod at once.
+
+Where Thoendel (ECMS 2014) scales one input per channel inside a box, here six jerks are free, and
+the legs themselves are the limits: lengths, speeds, accelerations and jerks, linearised each period
+about the rest of the accepted plan. What is followed is the specific force at the head and the body
+rates. Every plan ends at rest by construction (`mpc_grid`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp
+from time import perf_counter
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.axes import Array, frozen
+from motionserver.core.limits import Machine
+from motionserver.core.plan import Plan
+from motionserver.core.state import PlatformState, Stimulus
+from motionserver.cueing.base import Candidate, Report
+from motionserver.cueing.mpc_cost import Cost
+from motionserver.cueing.mpc_grid import PIECES, make_spline_grid
+from motionserver.cueing.mpc_nominal import Nominal, Projection
+from motionserver.cueing.mpc_outputs import linearise
+from motionserver.cueing.mpc_rows import Rows
+from motionserver.cueing.mpc_workspace import FREE, tuned_axes
+from motionserver.cueing.reference import Reference, believable
+from motionserver.cueing.tuning import Tuning
+from motionserver.solvers.base import QpMatrices, QpResult, QpStatus, QpVectors
+from motionserver.solvers.registry import make_backend
+
+RATE_CORNER: Final = 0.5
+"""High-pass of the wanted body rates [rad/s]: turning on and on cannot be followed."""
+LARGEST_DISTURBANCE: Final = 0.3
+"""Bound of the estimated output disturbance [m/s2]."""
+
+
+class SixAxis:
+    """The algorithm ``mpc``.
+
+    Args:
+        machine: Geometry and limits.
+        tuning: Tunables.
+        period: Planner period; the hand-over is one period ahead [s].
+        pieces: Pieces of constant jerk over the horizon.
+
+    Attributes:
+        disturbance: Specific force nobody planned, as estimated outside, (3,) [m/s2].
+
+    Raises:
+        ValueError: The tuning names a model or backend that does not exist, or the pieces do not
+            fit into its horizon.
+    """
+
+    name = "mpc"
+
+    def __init__(
+        self, machine: Machine, tuning: Tuning, period: float, pieces: int = PIECES
+    ) -> None:
+        self._machine, self._period, self._pieces = machine, period, pieces
+        self.disturbance: Array = np.zeros(3)
+        self._slow = np.zeros(3)
+        self._slow_share = 1.0 - exp(-RATE_CORNER * period)
+        self._tuning = tuning
+        self._build(tuning)
+        self._report = Report(frozen(tuning.box))
+
+    def _build(self, tuning: Tuning) -> None:
+        grid = make_spline_grid(tuning.horizon, self._period, self._pieces)
+        self._reference = self._make_reference(tuning, grid.nodes)
+        self._backend = make_backend(tuning.backend)
+        self._grid = grid
+        self._projection = Projection(grid)
+        self._rows = Rows(self._machine, grid, self._period, tuning.box)
+        self._cost = Cost(grid, self._rows.layout, tuning)
+        slacks = self._rows.layout.slacks
+        self._box = np.zeros(slacks), np.full(slacks, FREE)
+
+    def _make_reference(self, tuning: Tuning, nodes: Array) -> Reference:
+        return Reference(tuning.reference, self._period, nodes, self._period)
+
+    def retune(self, tuning: Tuning) -> None:
+        """Take other tunables; cheap unless horizon, reference, backend or tuned axes change.
+
+        Raises:
+            ValueError: As in the constructor; nothing has changed then.
+        """
+        old = self._tuning
+        axes = [tuned_axes(self._machine, each.box) for each in (old, tuning)]
+        if old.horizon != tuning.horizon or axes[0] != axes[1]:
+            self._build(tuning)
+        else:
+            reference, backend = self._reference, self._backend
+            if (old.reference, old.predictor) != (tuning.reference, tuning.predictor):
+                reference = self._make_reference(tuning, self._grid.nodes)
+            if old.backend != tuning.backend:
+                backend = make_backend(tuning.backend)
+            self._reference, self._backend = reference, backend
+            self._cost.weigh(tuning)
+        self._tuning = tuning
+
+    def propose(
+        self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus
+    ) -> Candidate | None:
+        """Linearise about the rest of the accepted plan and solve; see `Cueing.propose`."""
+        believed = believable(stimulus)
+        if believed is None:
+            self._say("not finite", 0)
+            return None
+        wanted = self._wanted(believed)
+        begun = perf_counter()
+        nominal = self._projection.of(start, parent, takeover)
+        outputs = linearise(
+            nominal.pose, nominal.velocity, nominal.acceleration, self._machine.head
+        )
+        linearised = perf_counter()
+        hessian, linear = self._cost.fill(nominal, outputs, wanted, _known(believed, self._period))
+        lower, upper = self._rows.fill(
+            start, nominal, outputs, wanted[:, 3:], self._tuning.tilt_rate, self._tuning.box
+        )
+        filled = perf_counter()
+        result = self._backend.solve(
+            QpVectors(linear, lower, upper, *self._box), QpMatrices(hessian, self._rows.matrix)
+        )
+        solved = perf_counter()
+        if not self._usable(result):
+            self._say(str(result.status), result.iterations)
+            return None
+        slacks = self._rows.layout.slacks
+        self._report = Report(
+            frozen(self._tuning.box),
+            result.iterations,
+            str(result.status),
+            {
+                "leg_slack": float(result.x[0]),
+                "tilt_rate_slack": float(result.x[1:slacks].max()) * self._tuning.tilt_rate,
+                "wanted_x": float(wanted[0, 0]),
+                "wanted_y": float(wanted[0, 1]),
+                "wanted_z": float(wanted[0, 2]),
+                "t_linearise": linearised - begun,
+                "t_fill": filled - linearised,
+                "t_solve": solved - filled,
+            },
+        )
+        return self._candidate(start, nominal, result.x[slacks:].reshape(6, -1).T)
+
+    def _wanted(self, stimulus: Stimulus) -> Array:
+        """Outputs to follow at the nodes, (N, 6): forces, and rates without their slow part."""
+        self._slow = self._slow + self._slow_share * (stimulus.rates - self._slow)
+        gain = self._tuning.rotation_gain
+        preview = stimulus.preview
+        if preview is not None and len(preview.times):
+            quick = preview.rates - self._slow_ahead(preview.times, preview.rates)
+            preview = replace(preview, rates=gain * quick)
+        quick = gain * (stimulus.rates - self._slow)
+        wanted = self._reference.predict(replace(stimulus, rates=quick, preview=preview))
+        bound = LARGEST_DISTURBANCE
+        wanted[:, :3] -= np.clip(np.nan_to_num(self.disturbance), -bound, bound)
+        return wanted
+
+    def _slow_ahead(self, times: Array, rates: Array) -> Array:
+        """The slow part of previewed rates, (n, 3) [rad/s]."""
+        shares = 1.0 - np.exp(-RATE_CORNER * np.diff(times, prepend=0.0))
+        slow, out = self._slow, np.empty_like(rates)
+        for index, share in enumerate(shares):
+            slow = slow + share * (rates[index] - slow)
+            out[index] = slow
+        return out
+
+    def _candidate(self, start: PlatformState, nominal: Nominal, deltas: Array) -> Candidate:
+        grid, maps = self._grid, self._grid.at_nodes
+        knots = grid.knots
+        tables = []
+        for begin, part, gain in (
+            (start.pose, nominal.pose, maps.pose),
+            (start.velocity, nominal.velocity, maps.velocity),
+            (start.acceleration, nominal.acceleration, maps.acceleration),
+        ):
+            tables.append(np.concatenate((begin[None], part[knots] + gain[knots] @ deltas)))
+        pose, velocity, acceleration = tables
+        # rest to the last bit: rounding leaves 1e-16 otherwise
+        velocity[-1] = acceleration[-1] = 0.0
+        return Candidate(grid.edges, frozen(pose), frozen(velocity), frozen(acceleration))
+
+    def _usable(self, result: QpResult) -> bool:
+        """An active set cut short is worthless; other methods' last iterates are plans as well."""
+        cut_short = result.status is QpStatus.BUDGET and self._tuning.backend != "daqp"
+        return (result.status is QpStatus.SOLVED or cut_short) and bool(np.isfinite(result.x).all())
+
+    def _say(self, status: str, iterations: int) -> None:
+        self._report = replace(self._report, solver_status=status, iterations=iterations)
+
+    def adopt(self, plan: Plan, kappa: float) -> None:
+        """Nothing to remember: the next period reads everything from the accepted plan."""
+
+    def report(self) -> Report:
+        """Tell about the last step."""
+        return self._report
+
+
+def _known(stimulus: Stimulus, lead: float) -> float:
+    """How far after the hand-over the future is told rather than believed [s]."""
+    preview = stimulus.preview
+    if preview is None or not len(preview.times):
+        return 0.0
+    return max(0.0, float(preview.times[-1]) - lead)

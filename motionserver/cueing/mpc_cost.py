@@ -1,0 +1,118 @@
+"""Cost of the six-axis programme: error of what is felt, and the price of being away and moving."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.axes import Array
+from motionserver.cueing.mpc_grid import SplineGrid
+from motionserver.cueing.mpc_nominal import Nominal
+from motionserver.cueing.mpc_outputs import Outputs
+from motionserver.cueing.mpc_rows import Layout
+from motionserver.cueing.tuning import Tuning
+
+HEAVE_SHARE: Final = 3.0
+"""Price of heave travel, in units of that of surge and sway; of yaw angle twice that of tilt."""
+YAW_SHARE: Final = 6.0
+VELOCITY: Final = (0.05, 0.02)
+"""Price of moving, translations [per (m/s)2] and angles [per (rad/s)2]."""
+ACCELERATION: Final = 0.002
+JERK: Final = 2e-6
+TILT_SLACK_SQUARE: Final = 1.0
+"""Quadratic part of the price of tilting too fast, in units of the linear one."""
+LEG_SLACK: Final = (10000.0, 1000.0)
+"""Linear and quadratic price of leaving the legs' margins, per share of a limit."""
+
+
+class Cost:
+    """Keeps what is constant of the cost and adds what the linearisation brings.
+
+    Args:
+        grid: The grid of plans.
+        layout: Where the variables are.
+        tuning: Weights.
+    """
+
+    def __init__(self, grid: SplineGrid, layout: Layout, tuning: Tuning) -> None:
+        self._grid, self._layout = grid, layout
+        self._outputs = np.zeros((len(grid.nodes), 6, 6, layout.columns))
+        self._hessian = np.zeros((layout.size, layout.size))
+        self._linear = np.zeros(layout.size)
+        self.weigh(tuning)
+
+    def weigh(self, tuning: Tuning) -> None:
+        """Take other weights."""
+        self._tuning = tuning
+        grid, layout, maps = self._grid, self._layout, self._grid.at_nodes
+        heave, rates = tuning.mpc_weight_heave, tuning.mpc_weight_rates
+        force = tuning.weight_force
+        self._weights = np.sqrt(
+            grid.share[:, None] * np.array([force, force, force * heave, rates, rates, rates])
+        )
+        travel, turn = tuning.mpc_weight_position, tuning.mpc_weight_attitude
+        places = (travel, travel, HEAVE_SHARE * travel, turn, turn, YAW_SHARE * turn)
+        share = grid.share[:, None]
+        self._prices = np.zeros((3, 6))
+        constant = np.zeros((layout.size, layout.size))
+        lengths = np.diff(grid.edges)[:, None]
+        for axis, place in enumerate(places):
+            speed = VELOCITY[0] if axis < 3 else VELOCITY[1]
+            self._prices[:, axis] = place, speed, ACCELERATION
+            block = JERK * (grid.basis.T @ (lengths * grid.basis))
+            for price, gain in zip(
+                self._prices[:, axis], (maps.pose, maps.velocity, maps.acceleration), strict=True
+            ):
+                block += price * (gain.T @ (share * gain))
+            columns = slice(
+                layout.slacks + axis * layout.columns, layout.slacks + (axis + 1) * layout.columns
+            )
+            constant[columns, columns] = block
+        tilt = max(tuning.mpc_weight_tilt_rate, 1e-4)
+        constant[0, 0] = LEG_SLACK[1]
+        knots = np.arange(1, layout.slacks)
+        constant[knots, knots] = tilt * TILT_SLACK_SQUARE
+        self._constant = constant
+        self._linear[0], self._linear[1 : layout.slacks] = LEG_SLACK[0], tilt
+        self._pulls = [(gain * share).T for gain in (maps.pose, maps.velocity, maps.acceleration)]
+        self._jerk_pull = JERK * (lengths * grid.basis).T
+
+    def fill(
+        self, nominal: Nominal, outputs: Outputs, wanted: Array, known: float
+    ) -> tuple[Array, Array]:
+        """Hessian (n, n) and gradient (n,) about a nominal.
+
+        Args:
+            nominal: The motion at the nodes.
+            outputs: What is felt there.
+            wanted: What should be felt there, (N, 6).
+            known: Until when it is known rather than believed [s].
+        """
+        maps, layout = self._grid.at_nodes, self._layout
+        beyond = np.maximum(self._grid.nodes - known, 0.0)
+        weights = self._weights * np.exp(-0.5 * beyond / self._tuning.mpc_trust)[:, None]
+        out, count = self._outputs, len(self._weights)
+        force, rates = weights[:, :3, None], weights[:, 3:, None]
+        np.multiply(
+            (force * outputs.by_acceleration)[..., None],
+            maps.acceleration[:, None, None],
+            out=out[:, :3],
+        )
+        out[:, :3, 3:] += (force * outputs.by_pose[:, :3])[..., None] * maps.pose[:, None, None]
+        np.multiply(
+            (rates * outputs.by_velocity)[..., None],
+            maps.velocity[:, None, None],
+            out=out[:, 3:, 3:],
+        )
+        flat = out.reshape(6 * count, 6 * layout.columns)
+        error = (weights * (outputs.value - wanted)).ravel()
+        slacks = layout.slacks
+        np.copyto(self._hessian, self._constant)
+        self._hessian[slacks:, slacks:] += flat.T @ flat
+        pull = self._jerk_pull @ nominal.jerks
+        motion = (nominal.pose, nominal.velocity, nominal.acceleration)
+        for price, gain, part in zip(self._prices, self._pulls, motion, strict=True):
+            pull += gain @ (price * part)
+        self._linear[slacks:] = error @ flat + pull.T.ravel()
+        return self._hessian, self._linear
