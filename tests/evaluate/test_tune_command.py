@@ -161,7 +161,8 @@ def test_standing_still_is_one_and_half_of_it_wanted_is_judged_as_such():
 
 
 def test_searching_the_scale_never_changes_what_is_wanted(tmp_path):
-    result = tune(DRIVES, out=tmp_path, search_scale=True, **(ASKED | {"trials": 4}))
+    asked = ASKED | {"algorithm": "mpc", "trials": 4}
+    result = tune(DRIVES, out=tmp_path, search_scale=True, **asked)
     assert {trial.values["scale"] for trial in result.trials} > {0.6}
     wanted = [
         trial.outcomes["truck_roundabout"].rmse / trial.outcomes["truck_roundabout"].nrmse
