@@ -74,10 +74,10 @@ def most_eventful(recording: Recording, seconds: float) -> Stretch:
     count = min(round(seconds / _STEP) + 1, len(grid))
     squares = _sums(force**2, count) / count - (_sums(force, count) / count) ** 2
     # rounded, so that rounding errors of the sums do not decide between equals
-    start = float(grid[int(np.argmax(np.round(squares.sum(axis=1), 9)))])
+    start = round(float(grid[int(np.argmax(np.round(squares.sum(axis=1), 9)))]), 6)
     lead = min(LEAD, start)
     piece = recording.excerpt(start - lead, start + seconds)
-    return Stretch(piece, start, start + seconds, lead)
+    return Stretch(piece, start, round(start + seconds, 6), lead)
 
 
 def stretches_of(recordings: list[Recording], seconds: float) -> tuple[Stretch, ...]:
