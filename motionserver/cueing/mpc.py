@@ -74,7 +74,7 @@ class SixAxis:
         self._grid = grid
         self._projection = Projection(grid)
         self._rows = Rows(self._machine, grid, self._period, tuning.box)
-        self._cost = Cost(grid, self._rows.layout, tuning)
+        self._cost = Cost(grid, self._rows.layout, tuning, self._period)
         slacks = self._rows.layout.slacks
         self._box = np.zeros(slacks), np.full(slacks, FREE)
 
@@ -115,6 +115,7 @@ class SixAxis:
         outputs = linearise(
             nominal.pose, nominal.velocity, nominal.acceleration, self._machine.head
         )
+        self._cost.remember(start, wanted[0], self._machine.head)
         linearised = perf_counter()
         hessian, linear = self._cost.fill(nominal, outputs, wanted, _known(believed, self._period))
         lower, upper = self._rows.fill(

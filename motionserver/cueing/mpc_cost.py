@@ -7,10 +7,12 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import Array
+from motionserver.core.state import PlatformState
 from motionserver.cueing.mpc_grid import SplineGrid
 from motionserver.cueing.mpc_nominal import Nominal
-from motionserver.cueing.mpc_outputs import Outputs
+from motionserver.cueing.mpc_outputs import Outputs, linearise
 from motionserver.cueing.mpc_rows import Layout
+from motionserver.cueing.perception import FAMILIES, Perceived
 from motionserver.cueing.tuning import Tuning
 
 HEAVE_SHARE: Final = 3.0
@@ -33,17 +35,30 @@ class Cost:
         grid: The grid of plans.
         layout: Where the variables are.
         tuning: Weights.
+        period: Planner period [s].
+
+    Raises:
+        ValueError: The tuning names a perception that does not exist.
     """
 
-    def __init__(self, grid: SplineGrid, layout: Layout, tuning: Tuning) -> None:
+    def __init__(self, grid: SplineGrid, layout: Layout, tuning: Tuning, period: float) -> None:
         self._grid, self._layout = grid, layout
+        self._period = period
+        self._tuning = tuning
+        self._perceived = make_perceived(tuning.perception, grid.nodes, period)
         self._outputs = np.zeros((len(grid.nodes), 6, 6, layout.columns))
         self._hessian = np.zeros((layout.size, layout.size))
         self._linear = np.zeros(layout.size)
         self.weigh(tuning)
 
     def weigh(self, tuning: Tuning) -> None:
-        """Take other weights."""
+        """Take other weights.
+
+        Raises:
+            ValueError: The tuning names a perception that does not exist; nothing has changed then.
+        """
+        if tuning.perception != self._tuning.perception:
+            self._perceived = make_perceived(tuning.perception, self._grid.nodes, self._period)
         self._tuning = tuning
         grid, layout, maps = self._grid, self._layout, self._grid.at_nodes
         heave, rates = tuning.mpc_weight_heave, tuning.mpc_weight_rates
@@ -78,6 +93,12 @@ class Cost:
         self._pulls = [(gain * share).T for gain in (maps.pose, maps.velocity, maps.acceleration)]
         self._jerk_pull = JERK * (lengths * grid.basis).T
 
+    def remember(self, start: PlatformState, wanted: Array, arm: Array) -> None:
+        """Let the organs take in what is felt at the hand-over against what is ``wanted`` (6,)."""
+        if self._perceived is not None:
+            parts = start.pose[None], start.velocity[None], start.acceleration[None]
+            self._perceived.learn(linearise(*parts, arm).value[0] - wanted)
+
     def fill(
         self, nominal: Nominal, outputs: Outputs, wanted: Array, known: float
     ) -> tuple[Array, Array]:
@@ -92,8 +113,11 @@ class Cost:
         maps, layout = self._grid.at_nodes, self._layout
         beyond = np.maximum(self._grid.nodes - known, 0.0)
         weights = self._weights * np.exp(-0.5 * beyond / self._tuning.mpc_trust)[:, None]
-        out, count = self._outputs, len(self._weights)
-        force, rates = weights[:, :3, None], weights[:, 3:, None]
+        error = outputs.value - wanted
+        # where organs filter the error, weights come after them
+        early = weights if self._perceived is None else np.ones_like(weights)
+        out, count = self._outputs, len(weights)
+        force, rates = early[:, :3, None], early[:, 3:, None]
         np.multiply(
             (force * outputs.by_acceleration)[..., None],
             maps.acceleration[:, None, None],
@@ -106,7 +130,10 @@ class Cost:
             out=out[:, 3:, 3:],
         )
         flat = out.reshape(6 * count, 6 * layout.columns)
-        error = (weights * (outputs.value - wanted)).ravel()
+        if self._perceived is not None:
+            flat, error = self._sensed(flat, error, weights)
+        else:
+            error = weights * error
         slacks = layout.slacks
         np.copyto(self._hessian, self._constant)
         self._hessian[slacks:, slacks:] += flat.T @ flat
@@ -114,5 +141,30 @@ class Cost:
         motion = (nominal.pose, nominal.velocity, nominal.acceleration)
         for price, gain, part in zip(self._prices, self._pulls, motion, strict=True):
             pull += gain @ (price * part)
-        self._linear[slacks:] = error @ flat + pull.T.ravel()
+        self._linear[slacks:] = error.ravel() @ flat + pull.T.ravel()
         return self._hessian, self._linear
+
+    def _sensed(self, flat: Array, error: Array, weights: Array) -> tuple[Array, Array]:
+        """Both as the organs feel them, then weighted."""
+        perceived = self._perceived
+        assert perceived is not None
+        felt = np.einsum("onm,mo->no", perceived.maps, error) + perceived.remembered()
+        by_output = flat.reshape(len(error), 6, -1).transpose(1, 0, 2)
+        moved = np.matmul(perceived.maps, by_output).transpose(1, 0, 2)
+        return (weights[..., None] * moved).reshape(flat.shape), weights * felt
+
+
+def make_perceived(name: str, nodes: Array, period: float) -> Perceived | None:
+    """The organs of a perception by name; None for "none".
+
+    Raises:
+        ValueError: There is no such perception.
+    """
+    if name == "none":
+        return None
+    if name not in FAMILIES:
+        raise ValueError(
+            f"perception {name!r} does not exist; allowed: none, {', '.join(FAMILIES)}; "
+            "change tuning.perception"
+        )
+    return Perceived(FAMILIES[name], nodes, period)

@@ -213,3 +213,21 @@ def test_a_long_turn_is_washed_out_of_yaw():
     yaw = np.concatenate(played.pose)[:, 5]
     assert yaw.max() > 0.03
     assert abs(yaw[-1]) < 0.7 * yaw.max()
+
+
+@pytest.mark.parametrize("perception", ["telban-cardullo", "reid-nahon"])
+def test_with_perceived_error_it_cues_otherwise_and_stays_inside(perception):
+    plain = Tuning(algorithm="mpc", reference="constant")
+    weighted = replace(plain, perception=perception)
+    forces = []
+    for tuning in (plain, weighted):
+        played = play(MACHINE, SixAxis(MACHINE, tuning, 0.01), brake(150))
+        assert played.violations(MACHINE) == 0
+        forces.append(played.felt(MACHINE)[0][:, 0])
+    assert np.abs(forces[0] - forces[1]).max() > 0.1
+    assert forces[1][-1] < -0.4
+
+
+def test_a_perception_that_does_not_exist_is_refused():
+    with pytest.raises(ValueError, match="allowed: none, telban-cardullo, reid-nahon"):
+        SixAxis(MACHINE, Tuning(algorithm="mpc", perception="dog"), 0.01)
