@@ -79,7 +79,7 @@ class SixAxis:
         self._box = np.zeros(slacks), np.full(slacks, FREE)
 
     def _make_reference(self, tuning: Tuning, nodes: Array) -> Reference:
-        return Reference(tuning.reference, self._period, nodes, self._period)
+        return Reference(tuning.reference, self._period, nodes, self._period, tuning.predictor)
 
     def retune(self, tuning: Tuning) -> None:
         """Take other tunables; cheap unless horizon, reference, backend or tuned axes change.
@@ -117,7 +117,7 @@ class SixAxis:
         )
         self._cost.remember(start, wanted[0], self._machine.head)
         linearised = perf_counter()
-        hessian, linear = self._cost.fill(nominal, outputs, wanted, _known(believed, self._period))
+        hessian, linear = self._cost.fill(nominal, outputs, wanted, self._reference.known)
         lower, upper = self._rows.fill(
             start, nominal, outputs, wanted[:, 3:], self._tuning.tilt_rate, self._tuning.box
         )
@@ -150,20 +150,21 @@ class SixAxis:
     def _wanted(self, stimulus: Stimulus) -> Array:
         """Outputs to follow at the nodes, (N, 6): forces, and rates without their slow part."""
         self._slow = self._slow + self._slow_share * (stimulus.rates - self._slow)
-        gain = self._tuning.rotation_gain
         preview = stimulus.preview
         if preview is not None and len(preview.times):
             quick = preview.rates - self._slow_ahead(preview.times, preview.rates)
-            preview = replace(preview, rates=gain * quick)
-        quick = gain * (stimulus.rates - self._slow)
-        wanted = self._reference.predict(replace(stimulus, rates=quick, preview=preview))
+            preview = replace(preview, rates=quick)
+        quick = stimulus.rates - self._slow
+        shown = replace(stimulus, rates=quick, preview=preview)
+        wanted = self._reference.predict(shown, stimulus.rates)
+        wanted[:, 3:] *= self._tuning.rotation_gain
         bound = LARGEST_DISTURBANCE
         wanted[:, :3] -= np.clip(np.nan_to_num(self.disturbance), -bound, bound)
         return wanted
 
     def _slow_ahead(self, times: Array, rates: Array) -> Array:
         """The slow part of previewed rates, (n, 3) [rad/s]."""
-        shares = 1.0 - np.exp(-RATE_CORNER * np.diff(times, prepend=0.0))
+        shares = 1.0 - np.exp(-RATE_CORNER * np.maximum(np.diff(times, prepend=0.0), 0.0))
         slow, out = self._slow, np.empty_like(rates)
         for index, share in enumerate(shares):
             slow = slow + share * (rates[index] - slow)
@@ -199,11 +200,3 @@ class SixAxis:
     def report(self) -> Report:
         """Tell about the last step."""
         return self._report
-
-
-def _known(stimulus: Stimulus, lead: float) -> float:
-    """How far after the hand-over the future is told rather than believed [s]."""
-    preview = stimulus.preview
-    if preview is None or not len(preview.times):
-        return 0.0
-    return max(0.0, float(preview.times[-1]) - lead)

@@ -1,44 +1,45 @@
 """What will be wanted over the horizon: the reference model (Thoendel 2014, equation 9, and more).
 
-Six signals: specific force minus g e_z (3), body rates (3).
+Six signals: specific force minus g e_z (3), body rates (3). One class per model; a preview is
+blended into whichever of them is in force.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from math import exp
+from math import isfinite
 from typing import Final
 
 import numpy as np
 
 from motionserver.core.axes import Array
-from motionserver.core.state import Preview, Stimulus
-from motionserver.cueing.autoregression import AutoRegression
+from motionserver.core.state import Driver, Stimulus
+from motionserver.cueing.predictor import named
+from motionserver.cueing.preview import PreviewKeeper
+from motionserver.cueing.reference_ar import Autoregressive
+from motionserver.cueing.reference_base import AxisModel
+from motionserver.cueing.reference_learned import Learned
+from motionserver.cueing.reference_simple import Constant, Fade
+from motionserver.cueing.reference_vehicle import Vehicle
 
-MODELS: Final = ("constant", "fade", "ar")
-HEAVE_FADE: Final = 0.2
-"""A vertical acceleration that lasts cannot be followed; believing in it does harm [s]."""
-FORCE_FADE: Final = 1.0
-"""Time constant of the "fade" model in surge and sway [s]."""
-RATE_FADE: Final = 1.0
-"""Time constant of body rates [s]."""
-PREVIEW_FADE: Final = 1.0
-"""How fast the end of a preview passes into the model [s]."""
-AR_ORDER: Final = 8
-AR_STEP: Final = 0.05
-"""Spacing of the samples of the autoregressive model [s]."""
-AR_CUTOFF: Final = 2.0 * np.pi * 1.5
-"""Low-pass in front of it [rad/s]."""
-AR_REST_FADE: Final = 0.2
-"""How fast what the low-pass took away fades [s]."""
-LARGEST: Final = 8.0
-"""Bound of a forecast force [m/s2]."""
 LARGEST_FORCE: Final = 50.0
 """More than this is believed of no stimulus [m/s2]."""
 LARGEST_RATE: Final = 10.0
 """The same of body rates [rad/s]."""
+LARGEST_SPEED: Final = 150.0
+"""The same of speed [m/s]."""
+LARGEST_STEERING: Final = 20.0
+"""The same of the steering wheel's angle [rad]."""
 
-_FADES: Final = {"constant": np.inf, "fade": FORCE_FADE, "ar": np.inf}
+_MAKERS: Final[dict[str, Callable[[float, Array, str], AxisModel]]] = {
+    "constant": lambda period, instants, predictor: Constant(instants),
+    "fade": lambda period, instants, predictor: Fade(instants),
+    "ar": lambda period, instants, predictor: Autoregressive(period, instants),
+    "vehicle": lambda period, instants, predictor: Vehicle(period, instants),
+    "learned": lambda period, instants, predictor: Learned(period, instants, named(predictor)),
+}
+MODELS: Final = tuple(_MAKERS)
 
 
 def believable(stimulus: Stimulus) -> Stimulus | None:
@@ -58,7 +59,23 @@ def believable(stimulus: Stimulus) -> Stimulus | None:
         force=np.clip(stimulus.force, -LARGEST_FORCE, LARGEST_FORCE),
         rates=np.clip(stimulus.rates, -LARGEST_RATE, LARGEST_RATE),
         preview=preview,
+        share=min(max(stimulus.share, 0.0), 1.0) if isfinite(stimulus.share) else 0.0,
+        speed=_within(stimulus.speed, LARGEST_SPEED),
+        driver=None if stimulus.driver is None else _believable_driver(stimulus.driver),
     )
+
+
+def _within(value: float, bound: float) -> float:
+    return min(max(value, -bound), bound) if isfinite(value) else 0.0
+
+
+def _believable_driver(told: Driver) -> Driver | None:
+    if not all(map(isfinite, (told.throttle, told.brake, told.clutch, told.steering))):
+        return None
+    throttle, brake, clutch = (
+        min(max(pedal, 0.0), 1.0) for pedal in (told.throttle, told.brake, told.clutch)
+    )
+    return Driver(throttle, brake, clutch, _within(told.steering, LARGEST_STEERING), told.gear)
 
 
 class Reference:
@@ -69,78 +86,53 @@ class Reference:
         period: Time between two stimuli [s].
         times: Instants after the hand-over that are asked for, (K,) [s].
         lead: From the newest stimulus to the hand-over [s].
+        predictor: Which fitted predictor "learned" uses, see `predictor.predictor_names`.
 
     Raises:
-        ValueError: The model does not exist.
+        ValueError: The model or the predictor does not exist.
     """
 
-    def __init__(self, model: str, period: float, times: Array, lead: float) -> None:
-        if model not in MODELS:
+    def __init__(
+        self, model: str, period: float, times: Array, lead: float, predictor: str = "truck"
+    ) -> None:
+        if model not in _MAKERS:
             raise ValueError(
                 f"reference model {model!r} does not exist; allowed: {', '.join(MODELS)}; "
                 "change tuning.reference"
             )
         self.model = model
-        self._instants = times + lead
-        force = _FADES[model]
-        scales = np.array([force, force, HEAVE_FADE, RATE_FADE, RATE_FADE, RATE_FADE])
-        self._decay = np.exp(-self._instants[:, None] / scales)
-        self._stride = max(1, round(AR_STEP / period))
-        self._smoothing = 1.0 - exp(-AR_CUTOFF * period)
-        self._models = [AutoRegression(AR_ORDER) for _ in range(2)]
-        self._history = np.zeros((AR_ORDER * self._stride + 1, 2))
-        self._stages = np.zeros((2, 2))
-        self._count = 0
-        step = self._stride * period
-        self._steps = np.arange(int(np.ceil(self._instants[-1] / step)) + 2) * step
-        self._rest_decay = np.exp(-self._instants / AR_REST_FADE)[:, None]
-        self._forecasts = [m.forecast_matrix(len(self._steps) - 1) for m in self._models]
+        self._lead = lead
+        instants = times + lead
+        self._axes = _MAKERS[model](period, instants, predictor)
+        self._preview = PreviewKeeper(period, instants)
 
-    def predict(self, stimulus: Stimulus) -> Array:
-        """Take in the newest stimulus and look ahead: (K, 6) [m/s2, rad/s]."""
-        now = np.concatenate((stimulus.force, stimulus.rates))
-        out: Array = now * self._decay
-        if self.model == "ar":
-            out[:, :2] = self._autoregressive(now[:2])
-        if stimulus.preview is not None and len(stimulus.preview.times):
-            out = self._with_preview(out, now, stimulus.preview)
-        return out
+    def predict(self, stimulus: Stimulus, turning: Array | None = None) -> Array:
+        """Take in the newest stimulus and look ahead: (K, 6) [m/s2, rad/s].
 
-    def _autoregressive(self, now: Array) -> Array:
-        if np.isfinite(now).all():
-            self._stages[0] += self._smoothing * (now - self._stages[0])
-            self._stages[1] += self._smoothing * (self._stages[0] - self._stages[1])
-            self._history[1:] = self._history[:-1]
-            self._history[0] = self._stages[1]
-        self._count += 1
-        sampled = self._history[:: self._stride]
-        for axis, model in enumerate(self._models):
-            # surge and sway learn in different ticks, so that none is much longer than the rest
-            if (self._count + axis * (self._stride // 2)) % self._stride == 0:
-                model.learn(sampled[1:, axis], float(sampled[0, axis]))
-                self._forecasts[axis] = model.forecast_matrix(len(self._steps) - 1)
-        out = np.empty((len(self._instants), 2))
-        for axis in range(2):
-            newest = sampled[:-1, axis]
-            ahead = np.concatenate((newest[:1], self._forecasts[axis] @ newest))
-            out[:, axis] = np.interp(self._instants, self._steps, ahead)
-        rest = (now - self._stages[1]) * self._rest_decay
-        forecast: Array = np.clip(out, -LARGEST, LARGEST) + rest
-        return forecast
+        To be called once in every period with what `believable` let through: the models count
+        time by these calls.
 
-    def _with_preview(self, model: Array, now: Array, preview: Preview) -> Array:
-        """Follow the preview while it lasts, then let its last error against the model decay."""
-        instants = self._instants
-        times = preview.times
-        table = np.concatenate((preview.force, preview.rates), axis=1)
-        if times[0] > 0.0:
-            times, table = np.append(0.0, times), np.concatenate((now[None], table))
-        end = float(times[-1])
-        known = instants <= end
-        out = model.copy()
-        for signal in range(6):
-            told = np.interp(instants, times, table[:, signal])
-            last = np.interp(end, instants, model[:, signal])
-            later = (table[-1, signal] - last) * np.exp(-(instants - end) / PREVIEW_FADE)
-            out[:, signal] = np.where(known, told, model[:, signal] + later)
-        return out
+        Args:
+            stimulus: What should be felt now.
+            turning: How the vehicle turns, (3,) [rad/s], if the stimulus holds only a part of it
+                (high-passed, say); models of the vehicle learn from this.
+        """
+        rates = stimulus.rates if turning is None else turning
+        return self._preview.blend(self._axes.predict(stimulus, rates), stimulus)
+
+    @property
+    def known(self) -> float:
+        """How far after the hand-over a preview tells the future rather than a model [s].
+
+        0 while its weight is not whole.
+        """
+        return max(0.0, self._preview.end - self._lead) if self._preview.weight >= 1.0 else 0.0
+
+    def describe(self) -> str:
+        """What the forecast rests on now, in a few words for people."""
+        weight = self._preview.weight
+        if weight <= 0.0:
+            return self._axes.status
+        if weight >= 1.0:
+            return f"preview, then {self._axes.status}"
+        return f"preview {100.0 * weight:.0f} %, then {self._axes.status}"

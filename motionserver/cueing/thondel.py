@@ -100,7 +100,7 @@ class Thondel:
             self._build(tuning)
         else:
             self._programme.weigh(tuning)
-            if old.reference != tuning.reference:
+            if (old.reference, old.predictor) != (tuning.reference, tuning.predictor):
                 self._reference = self._make_reference(tuning)
         if old.halving != tuning.halving:
             x_max = np.minimum(self._halving.x_max, tuning.box)
@@ -112,7 +112,7 @@ class Thondel:
         """Stumble over words that do not exist before anything is changed."""
         filter_set(tuning.filters)
         make_halving(tuning.halving, self._machine, tuning.box, self._period)
-        Reference(tuning.reference, self._period, np.zeros(1), 0.0)
+        Reference(tuning.reference, self._period, np.zeros(1), 0.0, tuning.predictor)
         if tuning.backend != self._tuning.backend:
             make_backend(tuning.backend)
 
@@ -127,7 +127,7 @@ class Thondel:
 
     def _make_reference(self, tuning: Tuning) -> Reference:
         instants = self._grid.knots[self._grid.nodes]
-        return Reference(tuning.reference, self._period, instants, self._period)
+        return Reference(tuning.reference, self._period, instants, self._period, tuning.predictor)
 
     def propose(
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus

@@ -11,6 +11,7 @@ from typing import Protocol
 from motionserver.core.intake.gate import Gate
 from motionserver.core.state import VehicleMotion
 from motionserver.planner.options import InputOptions
+from motionserver.planner.preview import PreviewInlet
 from motionserver.sources.base import SourceError, SourceFormat
 from motionserver.sources.registry import make_source
 from motionserver.sources.udp import UdpInput
@@ -22,10 +23,14 @@ MOST_SENDERS = 8
 """Senders per input whose format is remembered; more are strangers, and start anew."""
 
 
+Datagrams = list[tuple[bytes, str, int]]
+"""Bytes, sender, arrival [ns]."""
+
+
 class Transport(Protocol):
     """Where datagrams come from."""
 
-    def drain(self) -> list[tuple[bytes, str, int]]:
+    def drain(self) -> Datagrams:
         """Datagrams that wait: bytes, sender, arrival [ns]."""
         ...
 
@@ -40,11 +45,12 @@ class Transport(Protocol):
 
 @dataclass(slots=True)
 class Input:
-    """One source: transport, a decoder for each sender, name."""
+    """One source: transport, a decoder for each sender, name; previews on a way of their own."""
 
     options: InputOptions
     transport: Transport
     formats: dict[str, SourceFormat] = field(default_factory=dict)
+    drain_previews: Callable[[], Datagrams] = list
 
     @property
     def name(self) -> str:
@@ -72,13 +78,13 @@ def open_input(options: InputOptions) -> Input:
         ConfigError: The kind is unknown.
     """
     make_source(options.kind, options.key)
-    transport: Transport
     if options.kind == "zenoh":
         endpoint = f"tcp/{options.host}:{options.port}"
-        transport = ZenohInput(options.topic, [endpoint], list(options.connect))
-    else:
-        transport = UdpInput(options.host, options.port)
-    return Input(options, transport)
+        transport = ZenohInput(
+            options.topic, [endpoint], list(options.connect), options.preview_topic
+        )
+        return Input(options, transport, drain_previews=transport.drain_previews)
+    return Input(options, UdpInput(options.host, options.port))
 
 
 class Inputs:
@@ -88,6 +94,7 @@ class Inputs:
         self.inputs = inputs
         self.vehicle = Gate(may_change_owner)
         self.sensor = Gate()
+        self.previews = PreviewInlet()
         self.counters: Counter[str] = Counter()
         self.owner_input: Input | None = None
         self.last_error = ""
@@ -101,16 +108,13 @@ class Inputs:
         vehicle: list[VehicleMotion] = []
         sensor: list[VehicleMotion] = []
         for source in self.inputs:
-            for data, address, arrival_ns in source.transport.drain():
-                self.counters["packets"] += 1
-                try:
-                    motion = source.decode(data, address, arrival_ns)
-                except SourceError as error:
-                    self._refused(error.reason, f"{source.name} from {address}: {error}")
-                    continue
-                except Exception as error:
-                    # a third party's format that stumbles costs its packet, not the period
-                    self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")
+            for datagram in source.drain_previews():
+                motion = self._decoded(source, datagram)
+                if motion is not None:
+                    self._take_preview(source, datagram[1], motion)
+            for datagram in source.transport.drain():
+                motion, address = self._decoded(source, datagram), datagram[1]
+                if motion is None:
                     continue
                 wants_sensor = source.options.kind == "imu"
                 if wants_sensor and not motion.at_platform:
@@ -127,7 +131,29 @@ class Inputs:
                     self.owner_input = source
         self.counters["accepted"] += len(vehicle)
         self.counters["accepted_sensor"] += len(sensor)
+        if vehicle:
+            # the newest is what counts; all sources were read by now
+            vehicle[-1] = self.previews.attach(vehicle[-1])
         return vehicle, sensor
+
+    def _decoded(self, source: Input, datagram: tuple[bytes, str, int]) -> VehicleMotion | None:
+        data, address, arrival_ns = datagram
+        self.counters["packets"] += 1
+        try:
+            return source.decode(data, address, arrival_ns)
+        except SourceError as error:
+            self._refused(error.reason, f"{source.name} from {address}: {error}")
+        except Exception as error:
+            # a third party's format that stumbles costs its packet, not the period
+            self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")
+        return None
+
+    def _take_preview(self, source: Input, address: str, motion: VehicleMotion) -> None:
+        refusal = self.previews.offer(source.name, address, motion)
+        if refusal is None:
+            self.counters["accepted_preview"] += 1
+        else:
+            self._refused(refusal, f"preview, {source.name} from {address}: {refusal}")
 
     def _refused(self, reason: str, text: str) -> None:
         key = f"refused_{reason.replace('-', '_')}"

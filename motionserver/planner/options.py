@@ -22,6 +22,7 @@ class InputOptions:
         key: Key of signed packets, if any.
         topic: Zenoh key, for kind zenoh.
         connect: Zenoh endpoints to connect to, for kind zenoh.
+        preview_topic: Zenoh key of previews that come apart from the cues; "" for none.
     """
 
     kind: str
@@ -30,6 +31,7 @@ class InputOptions:
     key: bytes | None
     topic: str
     connect: tuple[str, ...]
+    preview_topic: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +73,7 @@ def read_options(run_dir: Path) -> PlannerOptions:
             key=bytes.fromhex(source["key"]) or None,
             topic=source["topic"],
             connect=tuple(source["connect"]),
+            preview_topic=source.get("preview_topic", ""),
         )
         for source in data["sources"]
     )

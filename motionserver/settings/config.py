@@ -6,9 +6,9 @@ import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -71,6 +71,7 @@ class SourceSection(Strict):
     listen: str = "127.0.0.1:4600"
     key_file: str = ""
     topic: str = "motion/0/in/cue"
+    preview_topic: str = ""
     connect: list[str] = Field(default_factory=list)
     allow_unsigned: bool = False
 
@@ -79,6 +80,14 @@ class SourceSection(Strict):
     def _address(cls, value: str) -> str:
         split_address(value)
         return value
+
+    @model_validator(mode="after")
+    def _preview_by_zenoh(self) -> Self:
+        if self.preview_topic and self.kind != "zenoh":
+            raise ValueError('preview_topic needs kind = "zenoh"; add a source of that kind')
+        if self.preview_topic and self.preview_topic == self.topic:
+            raise ValueError("preview_topic must differ from topic; cues may bring previews too")
+        return self
 
 
 class CueingSection(Strict):

@@ -126,6 +126,7 @@ def _source(source: SourceSection) -> dict[str, Any]:
         "key": key.hex(),
         "topic": source.topic,
         "connect": source.connect,
+        "preview_topic": source.preview_topic,
     }
 
 

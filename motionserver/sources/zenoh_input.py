@@ -43,29 +43,46 @@ class ZenohInput:
     The newest `DEPTH` samples are kept, so a flood cannot grow memory nor wake the loop.
     """
 
-    def __init__(self, topic: str, listen: list[str], connect: list[str]) -> None:
+    def __init__(
+        self, topic: str, listen: list[str], connect: list[str], preview_topic: str = ""
+    ) -> None:
         """Open the session and subscribe.
+
+        Args:
+            topic: Key of the cues.
+            listen: Endpoints to listen on.
+            connect: Endpoints to connect to.
+            preview_topic: Key on which previews are put, apart from the cues; "" for none.
 
         Raises:
             OSError: An endpoint or the key cannot be used.
         """
         self._slot: deque[tuple[bytes, str, int]] = deque(maxlen=DEPTH)
+        self._previews: deque[tuple[bytes, str, int]] = deque(maxlen=DEPTH)
         self._topic = topic
         try:
             self._session = zenoh.open(zenoh_config(listen, connect))
-            self._subscriber = self._session.declare_subscriber(topic, self._take)
+            self._subscribers = [self._session.declare_subscriber(topic, self._take)]
+            if preview_topic:
+                self._subscribers.append(
+                    self._session.declare_subscriber(preview_topic, self._take_preview)
+                )
         except zenoh.ZError as error:
             raise OSError(f"zenoh on {', '.join(listen)}, key {topic!r}: {error}") from error
 
     def _take(self, sample: zenoh.Sample) -> None:
-        self._slot.append(
-            (sample.payload.to_bytes(), f"zenoh:{sample.key_expr}", time.monotonic_ns())
-        )
+        self._slot.append(_told(sample))
+
+    def _take_preview(self, sample: zenoh.Sample) -> None:
+        self._previews.append(_told(sample))
 
     def drain(self) -> list[tuple[bytes, str, int]]:
         """Samples that wait: bytes, key as text, arrival [ns]."""
-        # the callback goes on storing meanwhile: take what is there now, no more
-        return [self._slot.popleft() for _ in range(len(self._slot))]
+        return _emptied(self._slot)
+
+    def drain_previews(self) -> list[tuple[bytes, str, int]]:
+        """Samples of the preview's own key that wait, likewise."""
+        return _emptied(self._previews)
 
     def reply(self, name: str, data: bytes) -> None:
         """Publish the status beside the cue, on .../status."""
@@ -73,5 +90,15 @@ class ZenohInput:
 
     def close(self) -> None:
         """Leave."""
-        self._subscriber.undeclare()  # type: ignore[no-untyped-call]
+        for subscriber in self._subscribers:
+            subscriber.undeclare()  # type: ignore[no-untyped-call]
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _told(sample: zenoh.Sample) -> tuple[bytes, str, int]:
+    return sample.payload.to_bytes(), f"zenoh:{sample.key_expr}", time.monotonic_ns()
+
+
+def _emptied(slot: deque[tuple[bytes, str, int]]) -> list[tuple[bytes, str, int]]:
+    # the callback goes on storing meanwhile: take what is there now, no more
+    return [slot.popleft() for _ in range(len(slot))]

@@ -1,8 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from motionserver.core.state import Preview, Stimulus
-from motionserver.cueing.reference import HEAVE_FADE, Reference
+from motionserver.core.state import Driver, Preview, Stimulus
+from motionserver.cueing.reference import MODELS, Reference, believable
+from motionserver.cueing.reference_base import HEAVE_FADE, RATE_FADE
 
 TIMES = np.array([0.01, 0.1, 0.5, 1.0, 2.0])
 
@@ -77,10 +82,57 @@ def test_preview_that_begins_later_is_joined_to_now():
 
 def test_lead_is_counted():
     preview = Preview(np.array([0.0, 1.0]), np.array([[0.0] * 3, [1.0] * 3]), np.zeros((2, 3)))
-    out = Reference("constant", 0.01, np.array([0.3]), 0.2).predict(stimulus(preview=preview))
+    out = Reference("constant", 0.01, np.array([0.3]), 0.2).predict(
+        stimulus(force=(0.0, 0.0, 0.0), preview=preview)
+    )
     assert out[0, 0] == pytest.approx(0.5)
 
 
 def test_unknown_model():
-    with pytest.raises(ValueError, match="constant, fade, ar"):
+    with pytest.raises(ValueError, match="constant, fade, ar, vehicle, learned"):
         Reference("oracle", 0.01, TIMES, 0.0)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_begins_at_now_and_fades_heave_and_roll(name):
+    model = Reference(name, 0.01, np.append(1e-6, TIMES), 0.0)
+    for _ in range(50):
+        out = model.predict(Stimulus(np.array([1.0, -2.0, 3.0]), np.full(3, 0.1), speed=10.0))
+    assert out[0] == pytest.approx([1.0, -2.0, 3.0, 0.1, 0.1, 0.1], abs=0.02)
+    assert out[1:, 2] == pytest.approx(3.0 * np.exp(-TIMES / HEAVE_FADE))
+    assert out[1:, 3:5] == pytest.approx(0.1 * np.exp(-TIMES / RATE_FADE)[:, None] * np.ones(2))
+    assert model.describe().startswith(name)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from(MODELS), st.sampled_from([0.0, 0.03, 0.6, 1.0]))
+def test_jumps_and_nonsense_leave_every_model_finite_and_bounded(seed, name, share):
+    rng = np.random.default_rng(seed)
+    model = Reference(name, 0.01, TIMES, 0.01)
+    for k in range(300):
+        wild = rng.choice([0.0, 1.0, 1e6, np.nan, -np.inf], p=[0.3, 0.6, 0.04, 0.03, 0.03])
+        said = Stimulus(
+            5.0 * share * rng.normal(size=3) * (wild if k % 50 == 0 else 1.0),
+            share * rng.normal(size=3),
+            share=share,
+            speed=30.0 * rng.normal() * wild,
+            driver=Driver(*np.abs(rng.normal(size=3)) * wild, rng.normal() * wild, 1),
+        )
+        believed = believable(said)
+        if believed is None:
+            continue
+        out = model.predict(believed)
+        assert np.isfinite(out).all()
+        assert np.abs(out).max() < 200.0
+    # and they come to their senses
+    for _ in range(600):
+        out = model.predict(Stimulus(np.array([1.0, 0.0, 0.0]), np.zeros(3), share=share))
+    assert np.abs(out[:, :2]).max() < 10.0
+
+
+def test_what_a_sender_does_not_tell_or_tells_as_nonsense():
+    said = Stimulus(np.zeros(3), np.zeros(3), share=np.nan, speed=np.inf)
+    believed = believable(replace(said, driver=Driver(0.0, np.nan, 0.0, 0.0, 1)))
+    assert (believed.share, believed.speed, believed.driver) == (0.0, 0.0, None)
+    bounded = believable(replace(said, driver=Driver(2.0, -1.0, 0.5, 1e3, 1))).driver
+    assert (bounded.throttle, bounded.brake, bounded.clutch, bounded.steering) == (1, 0, 0.5, 20)

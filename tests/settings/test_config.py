@@ -45,6 +45,12 @@ def test_the_defaults_run_on_loopback():
         ("[[sources]]\nlisten = 'a:65536'\n", "c.toml:2: sources.0.listen", "HOST:PORT"),
         ("[[sources]]\nlissten = ''\n", "c.toml:2: sources.0.lissten", "'listen'"),
         ("[[sources]]\nzzzz = ''\n", "c.toml:2: sources.0.zzzz", "Allowed: allow_unsigned"),
+        ("[[sources]]\npreview_topic = 'p'\n", "sources.0", 'needs kind = "zenoh"'),
+        (
+            "[[sources]]\nkind = 'zenoh'\npreview_topic = 'motion/0/in/cue'\n",
+            "sources.0",
+            "must differ from topic",
+        ),
         ("sources = 5\n", "c.toml:1: sources", "list"),
         ("web = 5\n", "c.toml:1: web", "WebSection"),
         ("web.port = 'x'\n", "web.port", "integer"),
