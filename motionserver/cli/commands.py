@@ -217,7 +217,10 @@ def evaluate(
 @app.command()
 def tune(
     recordings: Annotated[
-        list[Path], typer.Argument(help="two or more recordings", metavar="INPUT.csv...")
+        list[Path],
+        typer.Argument(
+            help="two or more recordings; one will do for --predictor", metavar="INPUT.csv..."
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", help="folder of preset and report", metavar="DIR")],
     algorithm: Annotated[
@@ -256,10 +259,20 @@ def tune(
         float, typer.Option("--sickness-weight", help="of that criterion, per m/s2", metavar="W")
     ] = 1.0,
     jobs: Annotated[int, typer.Option("--jobs", help="processes", metavar="J")] = 1,
+    predictor: Annotated[
+        str,
+        typer.Option(
+            "--predictor",
+            help="fit the reference 'learned' instead, under this name",
+            metavar="NAME",
+        ),
+    ] = "",
 ) -> None:
     """Search tunables on recordings, leave-one-out; writes a preset and the reasons for it."""
-    from motionserver.cli.tuning import run_tune
+    from motionserver.cli.tuning import run_predictor, run_tune
 
+    if predictor:
+        raise typer.Exit(run_predictor(recordings, predictor, out))
     options = {
         "algorithm": algorithm, "criterion": criterion, "trials": trials, "refine": refine,
         "seed": seed, "platform": platform, "excerpt": excerpt, "planner_hz": planner_rate,

@@ -11,6 +11,7 @@ import typer
 
 from motionserver.errors import ConfigError
 from motionserver.evaluate.tune.command import tune
+from motionserver.evaluate.tune.predictor import tune_predictor, worth
 from motionserver.evaluate.tune.tables import verdict
 
 
@@ -56,6 +57,13 @@ def run_tune(recordings: list[Path], out: Path, head: str, **options: Any) -> in
         result = tune(recordings, out=out, head=_point(head), progress=progress, **options)
     sys.stdout.write("\n".join([*verdict(result), f"written to {out}"]) + "\n")
     return 0 if result.held_out_violations == 0 else 1
+
+
+def run_predictor(recordings: list[Path], name: str, out: Path) -> int:
+    """Fit the reference model "learned" and say what it brings."""
+    predictor = tune_predictor(recordings, name, out)
+    sys.stdout.write("\n".join([*worth(predictor), f"written to {out}"]) + "\n")
+    return 0
 
 
 def _point(text: str) -> tuple[float, float, float] | None:
