@@ -231,6 +231,74 @@ def evaluate(
 
 
 @app.command()
+def tune(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(
+            help="two or more recordings; one will do for --predictor", metavar="INPUT.csv..."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="folder of preset and report", metavar="DIR")],
+    algorithm: Annotated[
+        str, typer.Option("--algorithm", help="mpc, thondel2014 or classical", metavar="NAME")
+    ] = "mpc",
+    criterion: Annotated[
+        str, typer.Option("--criterion", help="rmse, incongruence or sickness", metavar="NAME")
+    ] = "rmse",
+    trials: Annotated[
+        int, typer.Option("--trials", help="sets of values, the defaults among them", metavar="N")
+    ] = 30,
+    refine: Annotated[
+        int, typer.Option("--refine", help="more of them near the best of each fold", metavar="N")
+    ] = 0,
+    seed: Annotated[int, typer.Option("--seed", help="of everything random", metavar="S")] = 0,
+    platform: Annotated[
+        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
+    ] = "t2-compact",
+    head: Annotated[
+        str, typer.Option("--head", help="driver's head on the platform [m]", metavar="X,Y,Z")
+    ] = "",
+    excerpt: Annotated[
+        float, typer.Option("--excerpt", help="most eventful seconds judged; 0 = all", metavar="S")
+    ] = 20.0,
+    planner_rate: Annotated[
+        float, typer.Option("--planner-rate", help="plans per second", metavar="HZ")
+    ] = 50.0,
+    scale: Annotated[float, typer.Option("--scale", help="share wanted", metavar="K")] = 0.6,
+    search_scale: Annotated[
+        bool, typer.Option("--search-scale", help="search the scale asked for as well")
+    ] = False,
+    tilt_rate: Annotated[
+        float, typer.Option("--tilt-rate", help="threshold of tilting", metavar="DEG_S")
+    ] = 3.0,
+    sickness_weight: Annotated[
+        float, typer.Option("--sickness-weight", help="of that criterion, per m/s2", metavar="W")
+    ] = 1.0,
+    jobs: Annotated[int, typer.Option("--jobs", help="processes", metavar="J")] = 1,
+    predictor: Annotated[
+        str,
+        typer.Option(
+            "--predictor",
+            help="fit the reference 'learned' instead, under this name",
+            metavar="NAME",
+        ),
+    ] = "",
+) -> None:
+    """Search tunables on recordings, leave-one-out; writes a preset and the reasons for it."""
+    from motionserver.cli.tuning import run_predictor, run_tune
+
+    if predictor:
+        raise typer.Exit(run_predictor(recordings, predictor, out))
+    options = {
+        "algorithm": algorithm, "criterion": criterion, "trials": trials, "refine": refine,
+        "seed": seed, "platform": platform, "excerpt": excerpt, "planner_hz": planner_rate,
+        "scale": scale, "search_scale": search_scale, "tilt_rate_deg_s": tilt_rate,
+        "sickness_weight": sickness_weight, "jobs": jobs,
+    }  # fmt: skip
+    raise typer.Exit(run_tune(recordings, out, head, **options))
+
+
+@app.command()
 def reproduce(
     paper: Annotated[str, typer.Argument(help="thondel2014")],
     out: Annotated[
