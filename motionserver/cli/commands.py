@@ -187,15 +187,47 @@ def replay(
 
 @app.command()
 def evaluate(
-    recording: Annotated[Path, typer.Argument(help="recording", metavar="INPUT.csv")],
+    recording: Annotated[Path | None, typer.Argument(help="recording", metavar="INPUT.csv")] = None,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
     ] = "classical,thondel2014",
     platform: Annotated[
         str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
     ] = "t2-compact",
-    scale: Annotated[float, typer.Option("--scale", help="share wanted", metavar="K")] = 0.6,
+    scale: Annotated[
+        float | None, typer.Option("--scale", help="share wanted, else the tuning's", metavar="K")
+    ] = None,
     rate: Annotated[float, typer.Option("--rate", help="of setpoints", metavar="HZ")] = 500.0,
+    planner_rate: Annotated[
+        float, typer.Option("--planner-rate", help="of planning", metavar="HZ")
+    ] = 100.0,
+    head: Annotated[
+        str, typer.Option("--head", help="from the reference point [m]", metavar="X,Y,Z")
+    ] = "",
+    reference: Annotated[
+        str, typer.Option("--reference", help="reference model", metavar="NAME")
+    ] = "",
+    tilt_rate: Annotated[
+        str, typer.Option("--tilt-rate", help="threshold, or free", metavar="DEG_S")
+    ] = "",
+    tuning: Annotated[
+        str, typer.Option("--tuning", help="tunables", metavar="PRESET|FILE.toml")
+    ] = "",
+    preview: Annotated[
+        float, typer.Option("--preview", help="seconds told ahead, perfectly", metavar="S")
+    ] = 0.0,
+    disturb: Annotated[
+        bool, typer.Option("--disturb", help="late, failed and senseless plans")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", help="of --disturb")] = 0,
+    jobs: Annotated[int, typer.Option("--jobs", help="processes at the same time")] = 2,
+    compare: Annotated[
+        Path | None,
+        typer.Option("--compare", help="all recordings of a folder", metavar="FOLDER"),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", help="of --compare; may be resumed", metavar="DIR")
+    ] = Path("out/evaluate"),
     setpoints: Annotated[
         Path | None, typer.Option("--setpoints", help="write executed samples", metavar="OUT.csv")
     ] = None,
@@ -206,12 +238,33 @@ def evaluate(
         Path | None, typer.Option("--html", help="write a report", metavar="OUT")
     ] = None,
 ) -> None:
-    """Judge algorithms on a recording, offline, with the live code."""
-    from motionserver.cli.offline import run_evaluate
+    """Judge algorithms offline with the live code: on one recording or a folder of them."""
+    from motionserver.cli.offline import run_compare, run_evaluate
+    from motionserver.evaluate.options import EvaluateOptions
 
-    raise typer.Exit(
-        run_evaluate(recording, algorithm, platform, scale, rate, setpoints, json_out, html_out)
+    options = EvaluateOptions(
+        algorithm,
+        platform,
+        scale,
+        rate,
+        planner_rate,
+        head,
+        reference,
+        tilt_rate,
+        tuning,
+        preview,
+        disturb,
+        seed,
+        jobs,
+        setpoints,
+        json_out,
+        html_out,
     )
+    if compare is not None:
+        raise typer.Exit(run_compare(compare, out, options))
+    if recording is None:
+        raise typer.BadParameter("a recording or --compare FOLDER is needed")
+    raise typer.Exit(run_evaluate(recording, options))
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite, radians
 from pathlib import Path
 from typing import Any, Final
@@ -14,13 +14,74 @@ from motionserver.core.limits import Machine
 from motionserver.cueing.reference import MODELS
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
+from motionserver.evaluate.disturbance import Disturbance
+from motionserver.evaluate.drive import RATE_HZ
+from motionserver.evaluate.lockstep import PLANNER_HZ
 from motionserver.settings.fields import TuningError
+from motionserver.settings.machine import load_machine
 from motionserver.settings.tuning import apply_changes, default_for
 from motionserver.settings.tuning_presets import NAME, PresetShelf
 
 FREE_DEG_S: Final = 1000.0
 """The tilt rate that is called "free" [deg/s]."""
 _FARTHEST: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluateOptions:
+    """What was written at the prompt, as it was written.
+
+    Attributes:
+        algorithm: Names, comma between.
+        platform: Preset or file of the machine.
+        scale: Share of the motion that is wanted; None for the tuning's.
+        rate: Rate of judging [Hz].
+        planner_hz: Planner rate [Hz].
+        head: ``X,Y,Z`` [m], or empty.
+        reference: Reference model, or empty.
+        tilt_rate: In deg/s, "free", or empty.
+        preset: Preset or file of tunables, or empty.
+        preview: How far the recording is told ahead [s].
+        disturb: Whether planners are troubled.
+        seed: Of the trouble.
+        jobs: Processes at the same time.
+        setpoints: File for set-points, or None.
+        json_out: File for figures, or None.
+        html_out: File for the page, or None.
+    """
+
+    algorithm: str
+    platform: str = "t2-compact"
+    scale: float | None = None
+    rate: float = RATE_HZ
+    planner_hz: float = PLANNER_HZ
+    head: str = ""
+    reference: str = ""
+    tilt_rate: str = ""
+    preset: str = ""
+    preview: float = 0.0
+    disturb: bool = False
+    seed: int = 0
+    jobs: int = 2
+    setpoints: Path | None = None
+    json_out: Path | None = None
+    html_out: Path | None = None
+
+    def algorithms(self) -> list[str]:
+        """Names of algorithms."""
+        return [name.strip() for name in self.algorithm.split(",") if name.strip()]
+
+    def machine(self) -> Machine:
+        """The platform with the head where it is wanted."""
+        return machine_at(load_machine(self.platform), self.head)
+
+    def tuning(self) -> Tuning:
+        """All tunables."""
+        return tuning_from(self.machine(), self.preset, self.reference, self.tilt_rate, self.scale)
+
+    def disturbance(self) -> Disturbance | None:
+        """The trouble, if any is wanted."""
+        return Disturbance(seed=self.seed) if self.disturb else None
 
 
 def machine_at(machine: Machine, head: str) -> Machine:
