@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from motionserver import __version__
+from motionserver.evaluate.compare.contenders import RIVALS
 from motionserver.evaluate.compare.run import Result
 from motionserver.evaluate.compare.table import COLUMNS, RATIO, Block
 from motionserver.evaluate.page import STYLE as PAGE_STYLE
@@ -18,6 +19,8 @@ from motionserver.evaluate.svg import Curve, Panel, figure
 _WIDE: Final = 560
 _ROW: Final = 24
 _LABEL: Final = 190
+SHOWN: Final = 40.0
+"""Curves are drawn to here [s]."""
 _STYLE: Final = """
 body{max-width:1320px}
 h2 small{font-weight:400;color:var(--soft);font-size:13px;margin-left:8px}
@@ -25,7 +28,16 @@ h2 small{font-weight:400;color:var(--soft);font-size:13px;margin-left:8px}
 .grid2 .frame{margin:0}.frame h3{font-size:14px;margin:2px 0 6px}
 .bars{display:block;width:100%;height:auto;font:13px system-ui,sans-serif}
 .bars text{fill:var(--ink)}.bars .soft{fill:var(--soft);color:var(--soft)}
-.bars .bar{opacity:.9}.bars .one{stroke:var(--soft);stroke-dasharray:3 3}
+.bars text{paint-order:stroke;stroke:var(--card);stroke-width:4px;stroke-linejoin:round}
+.bars .pale{opacity:.5}.bars .hollow{fill-opacity:.18;stroke-width:1.5}
+.hollow.f1{stroke:var(--c1)}.hollow.f2{stroke:var(--c2)}.hollow.f3{stroke:var(--c3)}
+.hollow.f4{stroke:var(--c4)}.hollow.f5{stroke:var(--c5)}
+.key{display:flex;flex-wrap:wrap;gap:4px 18px;margin:0 0 12px;font-size:13px;color:var(--soft)}
+.key span::before{content:"";display:inline-block;width:18px;height:0;margin-right:6px;
+border-top:2.5px solid;vertical-align:4px}
+.k0::before{border-color:var(--c0)}.k1::before{border-color:var(--c1)}
+.k2::before{border-color:var(--c2)}.k3::before{border-color:var(--c3)}
+.bars .one{stroke:var(--soft);stroke-dasharray:3 3}
 .f0{fill:var(--c0)}.f1{fill:var(--c1)}.f2{fill:var(--c2)}.f3{fill:var(--c3)}.f4{fill:var(--c4)}
 .f5{fill:var(--c5)}
 .wide{padding:0}.wide table{font-size:13px}.wide th,.wide td{padding:5px 9px}
@@ -59,18 +71,35 @@ def to_html(
         f"{_cards(found)}<h2>Error felt<small>nRMSE of f_x and f_y: 0 is perfect, 1 is standing "
         f'still</small></h2><div class="grid2">{bars}</div><h2>All figures</h2>'
         f'<div class="frame wide">{_table(found)}</div><dl>{legend}</dl>'
-        f"<h2>Wanted and felt<small>{_legend_note(results)}</small></h2>"
+        f"<h2>Wanted and felt<small>the first {SHOWN:g} s of each</small></h2>{_key(results)}"
         f'<div class="grid2">{_curves(results)}</div>'
         f'<h2>Rules</h2><div class="notes">{notes}</div></body></html>\n'
     )
 
 
+def _is_rival(label: str) -> bool:
+    return label in RIVALS
+
+
 def _colour(label: str, block: Block) -> int:
-    """Rivals are quiet; algorithms take colours in their order."""
-    if label in ("no motion", "yardstick", "hindsight"):
+    """Rivals are quiet; each algorithm has a colour of its own, whatever its ways."""
+    if _is_rival(label):
         return 0
-    names = [line.label for line in block.lines]
-    return 1 + names.index(label) % 5
+    names = [line.label for line in block.lines if not _is_rival(line.label)]
+    return 1 + list(dict.fromkeys(map(_name, names))).index(_name(label)) % 5
+
+
+def _name(label: str) -> str:
+    """The algorithm's name alone."""
+    return label.split(" (")[0]
+
+
+def _way(label: str, block: Block) -> str:
+    """Full for the first way of an algorithm, hollow for the upper bound, pale between."""
+    if "(told" in label:
+        return "hollow"
+    ways = [line.label for line in block.lines if _name(line.label) == _name(label)]
+    return "" if ways[0] == label else "pale"
 
 
 def _bars(block: Block) -> str:
@@ -80,7 +109,11 @@ def _bars(block: Block) -> str:
     unit = (end - _LABEL) / top
     height = _ROW * len(block.lines) + 6
     best = block.best(0)
-    out = [f'<svg class="bars" viewBox="0 0 {_WIDE} {height}" role="img">']
+    one = _LABEL + unit
+    out = [
+        f'<svg class="bars" viewBox="0 0 {_WIDE} {height}" role="img">'
+        f'<path class="one" d="M{one:.1f} 2V{height - 2}"/>'
+    ]
     for row, line in enumerate(block.lines):
         y, value = _ROW * row + 3, values[row]
         weight = ' font-weight="650"' if row in best else ""
@@ -89,14 +122,13 @@ def _bars(block: Block) -> str:
             out.append(f'<text class="soft" x="{_LABEL}" y="{y + 15}">nothing wanted</text>')
             continue
         wide = unit * value
+        kind = f"f{_colour(line.label, block)} {_way(line.label, block)}"
         out.append(
-            f'<rect class="bar f{_colour(line.label, block)}" x="{_LABEL}" y="{y + 4}" rx="3" '
+            f'<rect class="bar {kind}" x="{_LABEL}" y="{y + 4}" rx="3" '
             f'width="{wide:.1f}" height="14"/>'
             f'<text x="{_LABEL + wide + 8:.1f}" y="{y + 15}"{weight}>{value:.3f}</text>'
         )
-    one = _LABEL + unit
-    out.append(f'<path class="one" d="M{one:.1f} 2V{height - 2}"/></svg>')
-    return "".join(out)
+    return "".join(out) + "</svg>"
 
 
 def _short(label: str) -> str:
@@ -154,13 +186,9 @@ def _kind(index: int, row: int, value: float | None, best: list[set[int]], wrong
 def _shown(results: Sequence[Result]) -> list[str]:
     """Whose curves are drawn: the first algorithm, its upper bound, the hardest rival."""
     labels = list(dict.fromkeys(result["contender"] for result in results))
-    first = labels[0].split(" (")[0]
-    told = [label for label in labels if label.startswith(f"{first} (told")]
-    return [labels[0], *told[:1], *(label for label in labels if label == "hindsight")]
-
-
-def _legend_note(results: Sequence[Result]) -> str:
-    return escape(f"the first 40 s each; {', '.join(_shown(results))} beside what is wanted")
+    told = [label for label in labels if label.startswith(f"{_name(labels[0])} (told")]
+    rival = [label for label in labels if label == "hindsight"]
+    return list(dict.fromkeys([labels[0], *rival, *told[:1]]))
 
 
 def _curves(results: Sequence[Result]) -> str:
@@ -172,25 +200,29 @@ def _curves(results: Sequence[Result]) -> str:
             continue
         here.sort(key=lambda r: -shown.index(r["contender"]))
         times = np.array(here[0]["curves"]["t"])
-        kept = times <= 40.0
+        kept = times <= SHOWN
         panels = []
         for axis, title in (("x", "f_x, forward [m/s²]"), ("y", "f_y, left [m/s²]")):
-            curves = [Curve("wanted", np.array(here[0]["curves"][f"wanted_{axis}"])[kept], 0)]
+            curves = [Curve("", np.array(here[0]["curves"][f"wanted_{axis}"])[kept], 0)]
             curves += [
                 Curve(
-                    _legend(r["contender"]),
+                    "",
                     np.array(r["curves"][f"felt_{axis}"])[kept],
-                    (1, 3, 2)[shown.index(r["contender"])] if len(shown) > 2 else 1,
+                    1 + shown.index(r["contender"]),
                 )
                 for r in here
             ]
-            panels.append(Panel(title, times[kept], curves, height=170))
-        out.append(f'<div class="frame"><h3>{escape(name)}</h3>{figure(panels, width=_WIDE)}</div>')
+            if max(float(np.abs(curve.values).max()) for curve in curves) > 0.02:
+                panels.append(Panel(title, times[kept], curves, height=170))
+        drawn = figure(panels, width=_WIDE) if panels else "<p>nothing wanted</p>"
+        out.append(f'<div class="frame"><h3>{escape(name)}</h3>{drawn}</div>')
     return "".join(out)
 
 
-def _legend(label: str) -> str:
-    """Short enough to stand beside two others."""
-    if "(told" in label:
-        return "told ahead"
-    return label.split(" (")[0]
+def _key(results: Sequence[Result]) -> str:
+    names = ["wanted", *_shown(results)]
+    return (
+        '<div class="key">'
+        + "".join(f'<span class="k{i}">{escape(name)}</span>' for i, name in enumerate(names))
+        + "</div>"
+    )
