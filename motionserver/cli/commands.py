@@ -199,8 +199,9 @@ def evaluate(
     ] = None,
     rate: Annotated[float, typer.Option("--rate", help="of setpoints", metavar="HZ")] = 500.0,
     planner_rate: Annotated[
-        float, typer.Option("--planner-rate", help="of planning", metavar="HZ")
-    ] = 100.0,
+        float | None,
+        typer.Option("--planner-rate", help="100, for omct 50 unless told", metavar="HZ"),
+    ] = None,
     head: Annotated[
         str, typer.Option("--head", help="from the reference point [m]", metavar="X,Y,Z")
     ] = "",
@@ -226,8 +227,14 @@ def evaluate(
         typer.Option("--compare", help="all recordings of a folder", metavar="FOLDER"),
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", help="of --compare; may be resumed", metavar="DIR")
+        Path, typer.Option("--out", help="of --compare (resumes) and omct", metavar="DIR")
     ] = Path("out/evaluate"),
+    amplitude: Annotated[
+        float, typer.Option("--amplitude", help="of omct's forces [m/s2]", metavar="A")
+    ] = 1.0,
+    boundaries: Annotated[
+        Path | None, typer.Option("--boundaries", help="of omct", metavar="FILE.toml")
+    ] = None,
     setpoints: Annotated[
         Path | None, typer.Option("--setpoints", help="write executed samples", metavar="OUT.csv")
     ] = None,
@@ -238,16 +245,17 @@ def evaluate(
         Path | None, typer.Option("--html", help="write a report", metavar="OUT")
     ] = None,
 ) -> None:
-    """Judge algorithms offline with the live code: on one recording or a folder of them."""
-    from motionserver.cli.offline import run_compare, run_evaluate
+    """Judge algorithms offline with the live code: a recording, a folder of them, or sines."""
+    from motionserver.cli.offline import run_compare, run_evaluate, run_omct
     from motionserver.evaluate.options import EvaluateOptions
 
+    sines = compare is None and recording == Path("omct")
     options = EvaluateOptions(
         algorithm,
         platform,
         scale,
         rate,
-        planner_rate,
+        planner_rate or (50.0 if sines else 100.0),
         head,
         reference,
         tilt_rate,
@@ -262,8 +270,10 @@ def evaluate(
     )
     if compare is not None:
         raise typer.Exit(run_compare(compare, out, options))
+    if sines:
+        raise typer.Exit(run_omct(out, options, amplitude, boundaries))
     if recording is None:
-        raise typer.BadParameter("a recording or --compare FOLDER is needed")
+        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
     raise typer.Exit(run_evaluate(recording, options))
 
 

@@ -42,6 +42,13 @@ def run_compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
     return compare(folder, out, options)
 
 
+def run_omct(out: Path, options: EvaluateOptions, amplitude: float, boundaries: Path | None) -> int:
+    """Measure frequency responses; 1 if any limit was broken."""
+    from motionserver.evaluate.omct.command import omct
+
+    return omct(out, options, amplitude, boundaries)
+
+
 def run_reproduce(paper: str, out: Path) -> int:
     """Redraw a paper; 1 if a claim no longer holds."""
     if paper not in PAPERS:

@@ -16,15 +16,15 @@ from motionserver.evaluate.page import STYLE as PAGE_STYLE
 from motionserver.evaluate.svg import STYLE as PLOT_STYLE
 from motionserver.evaluate.svg import Curve, Panel, figure
 
-_WIDE: Final = 560
+_WIDE: Final = 440
 _ROW: Final = 24
-_LABEL: Final = 190
+_LABEL: Final = 186
 SHOWN: Final = 40.0
 """Curves are drawn to here [s]."""
 _STYLE: Final = """
 body{max-width:1320px}
 h2 small{font-weight:400;color:var(--soft);font-size:13px;margin-left:8px}
-.grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,440px),1fr));gap:16px}
+.grid2{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,380px),1fr));gap:16px}
 .grid2 .frame{margin:0}.frame h3{font-size:14px;margin:2px 0 6px}
 .bars{display:block;width:100%;height:auto;font:13px system-ui,sans-serif}
 .bars text{fill:var(--ink)}.bars .soft{fill:var(--soft);color:var(--soft)}
@@ -34,9 +34,9 @@ h2 small{font-weight:400;color:var(--soft);font-size:13px;margin-left:8px}
 .hollow.f4{stroke:var(--c4)}.hollow.f5{stroke:var(--c5)}
 .key{display:flex;flex-wrap:wrap;gap:4px 18px;margin:0 0 12px;font-size:13px;color:var(--soft)}
 .key span::before{content:"";display:inline-block;width:18px;height:0;margin-right:6px;
-border-top:2.5px solid;vertical-align:4px}
-.k0::before{border-color:var(--c0)}.k1::before{border-color:var(--c1)}
-.k2::before{border-color:var(--c2)}.k3::before{border-color:var(--c3)}
+border-top:2.5px solid currentColor;vertical-align:4px}
+.key .k0::before{color:var(--c0)}.key .k1::before{color:var(--c1)}
+.key .k2::before{color:var(--c2)}.key .k3::before{color:var(--c3)}
 .bars .one{stroke:var(--soft);stroke-dasharray:3 3}
 .f0{fill:var(--c0)}.f1{fill:var(--c1)}.f2{fill:var(--c2)}.f3{fill:var(--c3)}.f4{fill:var(--c4)}
 .f5{fill:var(--c5)}
@@ -105,7 +105,7 @@ def _way(label: str, block: Block) -> str:
 def _bars(block: Block) -> str:
     values = [line.values[0] for line in block.lines]
     top = max(1.15, *(1.08 * value for value in values if value is not None))
-    end = _WIDE - 58
+    end = _WIDE - 52
     unit = (end - _LABEL) / top
     height = _ROW * len(block.lines) + 6
     best = block.best(0)
@@ -132,7 +132,7 @@ def _bars(block: Block) -> str:
 
 
 def _short(label: str) -> str:
-    return label.replace("told ", "").replace(" ahead", " told")
+    return label.replace("told ", "")
 
 
 def _cards(found: Sequence[Block]) -> str:
