@@ -30,7 +30,7 @@ from motionserver.evaluate.options import EvaluateOptions
 from motionserver.settings.machine import load_machine
 
 MACHINE = load_machine("t2-compact")
-QUICK = (6.31, 15.849)
+QUICK = (15.849,)
 
 
 def test_ten_tests_by_six_inputs():
@@ -84,7 +84,7 @@ def test_tilt_shows_force_with_the_sign_of_the_table():
 @pytest.fixture(scope="module")
 def found():
     tuning = Tuning(scale=0.3, gain=1.0)
-    return run_omct(MACHINE, tuning, ["classical"], force=0.5, planner_hz=100.0, frequencies=QUICK)
+    return run_omct(MACHINE, tuning, ["classical"], force=0.5, planner_hz=50.0, frequencies=QUICK)
 
 
 def test_classical_heave_is_its_own_filter_with_the_hand_over_behind_it(found):
@@ -96,9 +96,9 @@ def test_classical_heave_is_its_own_filter_with_the_hand_over_behind_it(found):
         filtered = s**2 / (s**2 + 2 * corner.zeta * corner.omega * s + corner.omega**2)
         filtered /= 1.0 + corner.tau * s
         assert point.gain == pytest.approx(abs(filtered), rel=0.1)
-        # one period to the hand-over and half a one of holding, at 100 Hz
+        # one period to the hand-over and half a one of holding, at 50 Hz
         late = np.degrees(np.angle(filtered)) - point.phase
-        assert 0.0 < np.radians(late) / point.omega < 0.04
+        assert 0.0 < np.radians(late) / point.omega < 0.06
 
 
 def test_surge_and_sway_answer_alike(found):
@@ -127,7 +127,7 @@ def test_files_hold_everything_and_boundaries_mark(tmp_path):
     assert data["responses"][0]["outside"] == []
     assert data["responses"][6]["late_s"] is None
     text = (tmp_path / "out" / "omct.txt").read_text()
-    assert "2 points outside the boundaries of: made up" in text
+    assert "1 points outside the boundaries of: made up" in text
     assert "forces 1 m/s2" in text
     page = (tmp_path / "out" / "omct.html").read_text()
     assert page.count("<svg") == 10
