@@ -203,15 +203,54 @@ def replay(
 
 @app.command()
 def evaluate(
-    recording: Annotated[Path, typer.Argument(help="recording", metavar="INPUT.csv")],
+    recording: Annotated[Path | None, typer.Argument(help="recording", metavar="INPUT.csv")] = None,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
     ] = "classical,thondel2014",
     platform: Annotated[
         str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
     ] = "t2-compact",
-    scale: Annotated[float, typer.Option("--scale", help="share wanted", metavar="K")] = 0.6,
+    scale: Annotated[
+        float | None, typer.Option("--scale", help="share wanted, else the tuning's", metavar="K")
+    ] = None,
     rate: Annotated[float, typer.Option("--rate", help="of setpoints", metavar="HZ")] = 500.0,
+    planner_rate: Annotated[
+        float | None,
+        typer.Option("--planner-rate", help="100, for omct 50 unless told", metavar="HZ"),
+    ] = None,
+    head: Annotated[
+        str, typer.Option("--head", help="from the reference point [m]", metavar="X,Y,Z")
+    ] = "",
+    reference: Annotated[
+        str, typer.Option("--reference", help="reference model", metavar="NAME")
+    ] = "",
+    tilt_rate: Annotated[
+        str, typer.Option("--tilt-rate", help="threshold, or free", metavar="DEG_S")
+    ] = "",
+    tuning: Annotated[
+        str, typer.Option("--tuning", help="tunables", metavar="PRESET|FILE.toml")
+    ] = "",
+    preview: Annotated[
+        float, typer.Option("--preview", help="seconds told ahead, perfectly", metavar="S")
+    ] = 0.0,
+    disturb: Annotated[
+        bool, typer.Option("--disturb", help="late, failed and senseless plans")
+    ] = False,
+    seed: Annotated[int, typer.Option("--seed", help="of --disturb")] = 0,
+    jobs: Annotated[int, typer.Option("--jobs", help="processes at the same time")] = 2,
+    compare: Annotated[
+        Path | None,
+        typer.Option("--compare", help="all recordings of a folder", metavar="FOLDER"),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", help="of --compare (resumes) and omct", metavar="DIR")
+    ] = Path("out/evaluate"),
+    amplitude: Annotated[
+        float, typer.Option("--amplitude", help="of omct's forces [m/s2]", metavar="A")
+    ] = 1.0,
+    boundaries: Annotated[
+        Path | None, typer.Option("--boundaries", help="of omct", metavar="FILE.toml")
+    ] = None,
     setpoints: Annotated[
         Path | None, typer.Option("--setpoints", help="write executed samples", metavar="OUT.csv")
     ] = None,
@@ -222,12 +261,36 @@ def evaluate(
         Path | None, typer.Option("--html", help="write a report", metavar="OUT")
     ] = None,
 ) -> None:
-    """Judge algorithms on a recording, offline, with the live code."""
-    from motionserver.cli.offline import run_evaluate
+    """Judge algorithms offline with the live code: a recording, a folder of them, or sines."""
+    from motionserver.cli.offline import run_compare, run_evaluate, run_omct
+    from motionserver.evaluate.options import EvaluateOptions
 
-    raise typer.Exit(
-        run_evaluate(recording, algorithm, platform, scale, rate, setpoints, json_out, html_out)
+    sines = compare is None and recording == Path("omct")
+    options = EvaluateOptions(
+        algorithm,
+        platform,
+        scale,
+        rate,
+        planner_rate or (50.0 if sines else 100.0),
+        head,
+        reference,
+        tilt_rate,
+        tuning,
+        preview,
+        disturb,
+        seed,
+        jobs,
+        setpoints,
+        json_out,
+        html_out,
     )
+    if compare is not None:
+        raise typer.Exit(run_compare(compare, out, options))
+    if sines:
+        raise typer.Exit(run_omct(out, options, amplitude, boundaries))
+    if recording is None:
+        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
+    raise typer.Exit(run_evaluate(recording, options))
 
 
 @app.command()

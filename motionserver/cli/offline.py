@@ -7,36 +7,46 @@ from pathlib import Path
 
 from motionserver.errors import ConfigError
 from motionserver.evaluate.command import evaluate
+from motionserver.evaluate.options import EvaluateOptions
 from motionserver.evaluate.report import to_text
-from motionserver.settings.machine import load_machine
 
 PAPERS = ("thondel2014",)
 BENCHES = ("loop", "plan", "latency", "all")
 
 
-def run_evaluate(
-    recording: Path,
-    algorithm: str,
-    platform: str,
-    scale: float,
-    rate: float,
-    setpoints: Path | None,
-    json_out: Path | None,
-    html_out: Path | None,
-) -> int:
+def run_evaluate(recording: Path, options: EvaluateOptions) -> int:
     """Evaluate and print; 1 if any limit was broken."""
+    machine, tuning = options.machine(), options.tuning()
     result = evaluate(
         recording,
-        [name.strip() for name in algorithm.split(",") if name.strip()],
-        load_machine(platform),
-        scale=scale,
-        rate=rate,
-        setpoints=setpoints,
-        json_out=json_out,
-        html_out=html_out,
+        options.algorithms(),
+        machine,
+        rate=options.rate,
+        setpoints=options.setpoints,
+        json_out=options.json_out,
+        html_out=options.html_out,
+        tuning=tuning,
+        planner_hz=options.planner_hz,
+        preview=options.preview,
+        disturbance=options.disturbance(),
+        jobs=options.jobs,
     )
     sys.stdout.write(to_text(result) + "\n")
     return 0 if result.violations == 0 else 1
+
+
+def run_compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
+    """Compare on all recordings of a folder; 1 if any limit was broken."""
+    from motionserver.evaluate.compare.command import compare
+
+    return compare(folder, out, options)
+
+
+def run_omct(out: Path, options: EvaluateOptions, amplitude: float, boundaries: Path | None) -> int:
+    """Measure frequency responses; 1 if any limit was broken."""
+    from motionserver.evaluate.omct.command import omct
+
+    return omct(out, options, amplitude, boundaries)
 
 
 def run_reproduce(paper: str, out: Path) -> int:

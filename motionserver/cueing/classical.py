@@ -51,26 +51,30 @@ class Classical:
         machine: Geometry and limits.
         tuning: Tunables.
         period: Planner period [s].
+        filters: Corners of the washout.
     """
 
     name = "classical"
 
-    def __init__(self, machine: Machine, tuning: Tuning, period: float) -> None:
+    def __init__(
+        self, machine: Machine, tuning: Tuning, period: float, filters: FilterSet = REID_NAHON
+    ) -> None:
         self._machine, self._tuning, self._period = machine, tuning, period
         # part of the interface; a filter does not predict, so nothing is corrected by it
         self.disturbance: Array = np.zeros(3)
         grid = make_grid(LOOK, period)
         self._times = grid.knots
-        self._rotation = RotationPart(REID_NAHON, grid)
+        self._rotation = RotationPart(filters, grid)
         begins = np.concatenate(([0.0], grid.knots[:-1]))
         self._input_share = np.exp(-np.maximum(0.0, begins - HOLD) / FADE)
         self._piece_share = np.exp(-np.maximum(0.0, grid.edges[:-1] - HOLD) / FADE)
         steps = np.diff(np.concatenate(([0.0], grid.knots)))
-        horizontal, vertical = high_pass(REID_NAHON.high), high_pass(REID_NAHON.heave)
+        horizontal, vertical = high_pass(filters.high), high_pass(filters.heave)
         self._translations = [
             (discretise(horizontal, step), discretise(vertical, step)) for step in steps
         ]
-        self._tilt = TiltLoop(REID_NAHON.low, steps)
+        self._tilt = TiltLoop(filters.low, steps)
+        self._slow_share = 1.0 - np.exp(-filters.yaw.omega * period)
         self._slow_yaw = 0.0
         self._report = Report(frozen(machine.box))
 
@@ -114,8 +118,7 @@ class Classical:
 
     def _rates(self, rates: Array) -> Array:
         """Inputs of the rotation part; yaw is high-passed twice, a long curve must wash out."""
-        share = 1.0 - np.exp(-REID_NAHON.yaw.omega * self._period)
-        self._slow_yaw += share * (float(rates[2]) - self._slow_yaw)
+        self._slow_yaw += self._slow_share * (float(rates[2]) - self._slow_yaw)
         gain = self._tuning.rotation_gain
         yaw_gain = self._tuning.gain
         return np.array([gain * rates[0], gain * rates[1], yaw_gain * (rates[2] - self._slow_yaw)])

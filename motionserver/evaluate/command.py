@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
@@ -12,11 +12,14 @@ from motionserver.core.limits import Machine
 from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
+from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ, Drive, no_motion
+from motionserver.evaluate.hearing import LONGEST_PREVIEW
+from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.page import to_html
-from motionserver.evaluate.recording import Recording, read_recording
+from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.result import EvaluateResult, to_json
 from motionserver.evaluate.setpoints import write_setpoints
 from motionserver.evaluate.yardstick import find_yardstick
@@ -36,6 +39,7 @@ def evaluate(
     tuning: Tuning | None = None,
     planner_hz: float = PLANNER_HZ,
     preview: float = 0.0,
+    disturbance: Disturbance | None = None,
     jobs: int = 2,
     quiet: bool = False,
 ) -> EvaluateResult:
@@ -56,11 +60,12 @@ def evaluate(
         planner_hz: Planner rate [Hz].
         preview: How far the algorithms (not the rivals) are told the recording ahead [s]; 0 as in
             life without a simulator that knows. The upper bound of what prediction can bring.
+        disturbance: Trouble for the algorithms (not the rivals); none if None.
         jobs: Processes for the yardstick's search; the result does not depend on it.
         quiet: True for no progress.
 
     Returns:
-        Drives and figures: the algorithms as asked for, "yardstick", "no motion".
+        Drives and figures: the algorithms as asked for, "yardstick", "hindsight", "no motion".
 
     Raises:
         ConfigError: An argument is wrong.
@@ -70,6 +75,10 @@ def evaluate(
     base = tuning or Tuning()
     base = base if scale is None else replace(base, scale=scale)
     _check(algorithms, base.scale, rate, planner_hz, setpoints)
+    if not 0.0 <= preview <= LONGEST_PREVIEW:
+        raise ConfigError(
+            "--preview", f"{preview:g} s is out of range", f"Give 0 to {LONGEST_PREVIEW:g} s."
+        )
     for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
         _check_folder(option, path)
     recording = read_recording(input_csv)
@@ -78,16 +87,31 @@ def evaluate(
         if not quiet:
             print(f"{recording.name}: {text}", file=sys.stderr, flush=True)  # noqa: T201
 
-    drives = [
-        _timed(machine, recording, replace(base, algorithm=name), rate, planner_hz, preview, tell)
-        for name in algorithms
-    ]
+    def driven(name: str) -> Drive:
+        begun = perf_counter()
+        out = drive(
+            machine,
+            recording,
+            replace(base, algorithm=name),
+            rate=rate,
+            planner_hz=planner_hz,
+            preview=preview,
+            disturbance=disturbance,
+        )
+        tell(f"{name}: {recording.duration:.1f} s driven in {perf_counter() - begun:.1f} s")
+        return out
+
+    drives = [driven(name) for name in algorithms]
     if setpoints is not None:
         write_setpoints(drives[0], setpoints)
     yardstick = find_yardstick(
         machine, recording, base, rate=rate, planner_hz=planner_hz, jobs=jobs, tell=tell
     )
-    drives += [yardstick.drive, no_motion(machine, recording, base.scale, rate)]
+    hindsight = find_hindsight(
+        machine, recording, base, rate=rate, planner_hz=planner_hz, tell=tell
+    )
+    still = no_motion(machine, recording, base.scale, rate)
+    drives += [yardstick.drive, hindsight.drive, still]
     result = EvaluateResult(
         recording,
         machine,
@@ -96,30 +120,16 @@ def evaluate(
         planner_hz,
         preview,
         tuple(drives),
-        tuple(figures_of(driven) for driven in drives),
+        tuple(figures_of(each) for each in drives),
         yardstick,
+        hindsight,
+        disturbance,
     )
     if json_out is not None:
         Path(json_out).write_text(to_json(result), encoding="utf-8")
     if html_out is not None:
         Path(html_out).write_text(to_html(result), encoding="utf-8")
     return result
-
-
-def _timed(
-    machine: Machine,
-    recording: Recording,
-    tuning: Tuning,
-    rate: float,
-    planner_hz: float,
-    preview: float,
-    tell: Callable[[str], None],
-) -> Drive:
-    begun = perf_counter()
-    driven = drive(machine, recording, tuning, rate=rate, planner_hz=planner_hz, preview=preview)
-    took = perf_counter() - begun
-    tell(f"{tuning.algorithm}: {recording.duration:.1f} s driven in {took:.1f} s")
-    return driven
 
 
 def _check(

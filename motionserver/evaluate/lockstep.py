@@ -15,19 +15,18 @@ from motionserver.core.intake.freshness import SECOND_NS
 from motionserver.core.intake.gate import Gate
 from motionserver.core.intake.intake import Head, Intake
 from motionserver.core.limits import Machine
-from motionserver.core.motion.player import Playback, advance, follow, state_now
+from motionserver.core.motion.player import Playback, advance, follow
 from motionserver.core.safety.accept import accept_proposal, accept_rest
 from motionserver.core.safety.verdict import AcceptedPlan, Rejection
-from motionserver.core.state import Preview, VehicleMotion
 from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
+from motionserver.evaluate.disturbance import Disturbance, Trouble
 from motionserver.evaluate.drive import RATE_HZ, Drive, Periods, assemble
+from motionserver.evaluate.hearing import Hearing
 from motionserver.evaluate.recording import Recording
 
 PLANNER_HZ: Final = 100.0
 """Planner rate unless told otherwise [Hz]."""
-PREVIEW_STEP: Final = 0.05
-"""Spacing of a preview's samples [s]."""
 Progress = Callable[[float], None]
 
 
@@ -71,6 +70,7 @@ def drive(
     vehicle_head: Array | None = None,
     preview: float = 0.0,
     thinker: Thinker | None = None,
+    disturbance: Disturbance | None = None,
     progress: Progress | None = None,
 ) -> Drive:
     """Drive a recording through gate, intake, planner, governor, verification and player.
@@ -86,15 +86,17 @@ def drive(
         planner_hz: Planner rate [Hz].
         vehicle_head: Driver's head from the recorded point, vehicle axes, (3,) [m]; zero if None.
         preview: How far the recording itself is told ahead, as by a simulator that knows what
-            comes [s]; 0 for none.
+            comes [s], at most 4; 0 for none.
         thinker: Another planner than that of ``tuning``.
+        disturbance: Late, failed and senseless plans; none if None.
         progress: Called about once per second of the drive with the share done, 0..1.
 
     Returns:
         Everything wanted and executed.
 
     Raises:
-        ValueError: A rate is not positive, or neutral is no pose of this machine.
+        ValueError: A rate is not positive, the preview too long, or neutral no pose of this
+            machine.
     """
     if not (np.isfinite(rate) and rate > 0.0 and np.isfinite(planner_hz) and planner_hz > 0.0):
         raise ValueError(
@@ -109,14 +111,18 @@ def drive(
 
     samples = int(np.floor(recording.duration * rate + 1e-6)) + 1
     states = np.empty((samples, 18))
-    count, given, now = 0, 0, 0.0
+    hearing = Hearing(recording, preview, gate, intake, log.gate)
+    trouble = None if disturbance is None else Trouble(disturbance, period)
+    count, now = 0, 0.0
     for number in range(int(np.floor(recording.duration * planner_hz + 1e-6)) + 1):
         start, end = number / planner_hz, (number + 1) / planner_hz
         playback, now = advance(playback, start - now), start
         now_ns = round(start * SECOND_NS)
-        given = _hear(recording, given, start, preview, gate, intake, log)
+        hearing.until(start)
         wanted = intake.stimulus(head, period, not gate.freshness.is_stale(now_ns))
 
+        if trouble is not None:
+            trouble.ride(mind)
         before = perf_counter()
         parent = playback.newest
         thought = mind.think(
@@ -142,11 +148,14 @@ def drive(
             else:
                 playback = follow(playback, verdict)
 
-        while count < samples and (instant := count / rate) < end - 1e-9:
+        played: list[Playback] = []
+        while (
+            count + len(played) < samples and (instant := (count + len(played)) / rate) < end - 1e-9
+        ):
             playback, now = advance(playback, max(0.0, instant - now)), max(now, instant)
-            state = state_now(playback)
-            states[count] = np.concatenate((state.pose, state.velocity, state.acceleration))
-            count += 1
+            played.append(playback)
+        states[count : count + len(played)] = _states(played)
+        count += len(played)
         if progress is not None and number % round(max(planner_hz, 1.0)) == 0:
             progress(count / samples)
     return assemble(
@@ -171,46 +180,16 @@ def _standing(machine: Machine, homes: Array) -> AcceptedPlan:
     return rest
 
 
-def _hear(
-    recording: Recording,
-    given: int,
-    now: float,
-    preview: float,
-    gate: Gate,
-    intake: Intake,
-    log: _Log,
-) -> int:
-    """Offer every sample that has arrived by ``now`` [s]; return how many are given."""
-    while given < len(recording.times) and recording.times[given] <= now + 1e-9:
-        stamp = round(float(recording.times[given]) * SECOND_NS)
-        motion = VehicleMotion(
-            stamp,
-            1,
-            given,
-            stamp,
-            recording.force[given],
-            recording.rates[given],
-            float(recording.speed[given]),
-            preview=_preview(recording, given, preview) if preview > 0.0 else None,
-        )
-        refusal = gate.refuse("recording", recording.name, motion)
-        if refusal is None:
-            intake.offer(motion)
-        else:
-            log.gate[refusal] += 1
-        given += 1
-    return given
-
-
-def _preview(recording: Recording, given: int, seconds: float) -> Preview | None:
-    """What the recording holds after sample ``given``, as far as it goes."""
-    now = recording.times[given]
-    ahead = now + np.arange(1, int(seconds / PREVIEW_STEP) + 1) * PREVIEW_STEP
-    ahead = ahead[ahead <= recording.times[-1] + 1e-9]
-    if len(ahead) == 0:
-        return None
-    columns = [
-        np.interp(ahead, recording.times, c) for c in (*recording.force.T, *recording.rates.T)
-    ]
-    both = np.column_stack(columns)
-    return Preview(frozen(ahead - now), frozen(both[:, :3]), frozen(both[:, 3:]))
+def _states(samples: list[Playback]) -> Array:
+    """Pose, velocity and acceleration of each of them, (N, 18): one evaluation for each plan."""
+    out = np.empty((len(samples), 18))
+    begin = 0
+    while begin < len(samples):
+        plan = samples[begin].playing.plan
+        end = begin
+        while end < len(samples) and samples[end].playing.plan is plan:
+            end += 1
+        clocks = np.array([sample.clock for sample in samples[begin:end]])
+        out[begin:end] = np.concatenate(plan.evaluate(clocks), axis=1)
+        begin = end
+    return out

@@ -11,6 +11,7 @@ import numpy as np
 from motionserver import __version__
 from motionserver.core.axes import Axis
 from motionserver.evaluate.drive import Drive
+from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.metrics.comfort import tilt_rate
 from motionserver.evaluate.report import remarks
 from motionserver.evaluate.result import EvaluateResult
@@ -68,7 +69,9 @@ def to_html(result: EvaluateResult) -> str:
         f"<title>{escape(title)}</title><style>{STYLE}{PLOT_STYLE}</style></head><body>"
         f'<h1>{escape(title)}</h1><p class="soft">{facts}</p>{_cards(result)}{notes}'
         f'<p class="soft">Yardstick: {escape(RULE)}. Its gain here: '
-        f"{result.yardstick.gain:g}.</p>{plots}<h2>All figures</h2>"
+        f"{result.yardstick.gain:g}.</p>"
+        f'<p class="soft">Hindsight: {escape(HINDSIGHT_RULE)}. Here: '
+        f"{escape(result.hindsight.described())}.</p>{plots}<h2>All figures</h2>"
         f'<div class="frame">{_table(result)}</div></body></html>\n'
     )
 
@@ -127,7 +130,7 @@ def _table(result: EvaluateResult) -> str:
 
 
 def _plots(result: EvaluateResult) -> list[tuple[str, list[Panel]]]:
-    movers = [drive for drive in result.drives if drive.name != "no motion"]
+    movers = [drive for drive in result.drives if drive.name not in ("no motion", "hindsight")]
     out = [
         ("Specific force at the head", _force_panels(movers)),
         ("Body rates", _rate_panels(movers)),

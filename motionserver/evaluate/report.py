@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from math import degrees
+
 from motionserver import __version__
+from motionserver.core.axes import Array
+from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.result import EvaluateResult
 from motionserver.evaluate.rows import sections
 from motionserver.evaluate.yardstick import RULE
@@ -23,7 +27,10 @@ def to_text(result: EvaluateResult) -> str:
         f"scale {tuning.scale:g}",
         f"machine {machine.name} ({machine.digest}), planner {result.planner_hz:g} Hz, "
         f"judged on executed samples at {result.rate:g} Hz",
+        f"driver's head at {_point(machine.head)} m, reference {tuning.reference}, tilt rate "
+        f"{degrees(tuning.tilt_rate):g} deg/s",
         f"yardstick: {RULE}; gain {result.yardstick.gain:g}",
+        f"hindsight: {HINDSIGHT_RULE}; here {result.hindsight.described()}",
         "",
         " " * label + "".join(name.rjust(width) for name, width in zip(names, widths, strict=True)),
     ]
@@ -38,6 +45,10 @@ def to_text(result: EvaluateResult) -> str:
     return "\n".join([*lines, "", *remarks(result)]) + "\n"
 
 
+def _point(point: Array) -> str:
+    return ", ".join(f"{value:g}" for value in point)
+
+
 def remarks(result: EvaluateResult) -> list[str]:
     """What must be said whatever the figures are: safety first, then who wins, then why not."""
     out = [
@@ -50,19 +61,24 @@ def remarks(result: EvaluateResult) -> list[str]:
             f"the algorithms were told {result.preview:g} s ahead, the rivals nothing: an upper "
             "bound, not what a simulator without preview gets"
         )
-    yard, still = result.of("yardstick"), result.of("no motion")
+    if result.disturbance is not None:
+        trouble = result.disturbance
+        out.append(
+            f"the algorithms were troubled (seed {trouble.seed}): {100 * trouble.stalled:g} % of "
+            f"plans stalled for {1e3 * trouble.stall:g} ms, {100 * trouble.failed:g} % failed, "
+            f"{100 * trouble.nan:g} % were not numbers"
+        )
+    rivals = [result.of(name) for name in ("yardstick", "hindsight", "no motion")]
     for figures in result.figures:
         planning = figures.planning
-        if planning is None or figures.name == "yardstick":
+        if planning is None or figures in rivals:
             continue
         against = [
             f"{'below' if figures.rmse_xy < rival.rmse_xy else 'NOT below'} {rival.name} "
             f"({rival.rmse_xy:.3f})"
-            for rival in (yard, still)
+            for rival in rivals
         ]
-        out.append(
-            f"{figures.name}: RMSE(x, y) {figures.rmse_xy:.3f} m/s2 is {' and '.join(against)}"
-        )
+        out.append(f"{figures.name}: RMSE(x, y) {figures.rmse_xy:.3f} m/s2 is {', '.join(against)}")
         for what, reasons in (
             ("the governor halved or refused", planning.refusals),
             ("no candidate", planning.troubles),

@@ -8,7 +8,9 @@ from dataclasses import asdict, dataclass
 from motionserver import __version__
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
+from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import Drive
+from motionserver.evaluate.hindsight import HINDSIGHT_RULE, Hindsight
 from motionserver.evaluate.metrics.figures import Figures
 from motionserver.evaluate.recording import Recording
 from motionserver.evaluate.yardstick import RULE, Yardstick
@@ -27,9 +29,11 @@ class EvaluateResult:
         rate: Of the executed samples [Hz].
         planner_hz: Planner rate [Hz].
         preview: How far the algorithms were told the recording ahead [s].
-        drives: Algorithms as asked for, then the yardstick, then no motion.
+        drives: Algorithms as asked for, then yardstick, hindsight, no motion.
         figures: Of the drives, in the same order.
         yardstick: How it was found.
+        hindsight: How it was found.
+        disturbance: How the algorithms were troubled; None if not.
     """
 
     recording: Recording
@@ -41,6 +45,8 @@ class EvaluateResult:
     drives: tuple[Drive, ...]
     figures: tuple[Figures, ...]
     yardstick: Yardstick
+    hindsight: Hindsight
+    disturbance: Disturbance | None = None
 
     def of(self, name: str) -> Figures:
         """The figures of one algorithm or rival.
@@ -77,6 +83,7 @@ def to_mapping(result: EvaluateResult) -> dict[str, object]:
             "samples": len(result.recording.times),
         },
         "machine": {"name": result.machine.name, "digest": result.machine.digest},
+        "head_m": result.machine.head.tolist(),
         "scale": result.tuning.scale,
         "rate_hz": result.rate,
         "planner_hz": result.planner_hz,
@@ -87,6 +94,18 @@ def to_mapping(result: EvaluateResult) -> dict[str, object]:
             "gain": result.yardstick.gain,
             "tried": [{"gain": gain, "rmse_xy": rmse} for gain, rmse in result.yardstick.tried],
         },
+        "hindsight": {
+            "rule": HINDSIGHT_RULE,
+            "high_rad_s": result.hindsight.washout.high,
+            "low_rad_s": result.hindsight.washout.low,
+            "gain": result.hindsight.washout.gain,
+            "by": "server" if result.hindsight.by_server else "screen",
+            "rmse_xy_screen": result.hindsight.best_screen,
+            "rmse_xy_server": result.hindsight.best_server,
+            "screened": [asdict(trial) for trial in result.hindsight.screened],
+            "driven": [asdict(trial) for trial in result.hindsight.driven],
+        },
+        "disturbance": None if result.disturbance is None else asdict(result.disturbance),
         "violations": result.violations,
         "rejected": result.rejected,
         "results": [asdict(figures) for figures in result.figures],

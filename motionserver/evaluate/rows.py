@@ -55,14 +55,20 @@ _AXES = {
 def sections(result: EvaluateResult) -> list[Section]:
     """All figures; axes on which nothing is wanted and nothing felt are left out."""
     columns = result.figures
-    yard = result.of("yardstick").rmse_xy
+    yard, hind = (result.of(name).rmse_xy for name in ("yardstick", "hindsight"))
     out = [
         Section(
             "Horizontal specific force, x and y together",
             (
                 _row("RMSE [m/s2]", columns, lambda f: f.rmse_xy, less=True),
                 _row("nRMSE (1 = no motion)", columns, lambda f: f.nrmse_xy, less=True),
+                _row("nRMSE below 0.1 Hz", columns, lambda f: f.xy.low, less=True),
+                _row("nRMSE 0.1 to 0.5 Hz", columns, lambda f: f.xy.mid, less=True),
+                _row("nRMSE above 0.5 Hz (onset)", columns, lambda f: f.xy.onset, less=True),
+                _row("perceived-error nRMSE", columns, lambda f: f.xy.perceived, less=True),
+                _row("correlation at no lag", columns, lambda f: f.xy.correlation, more=True),
                 _row("RMSE / yardstick", columns, lambda f: f.rmse_xy / yard if yard else None),
+                _row("RMSE / hindsight", columns, lambda f: f.rmse_xy / hind if hind else None),
             ),
         )
     ]

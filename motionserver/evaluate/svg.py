@@ -67,25 +67,26 @@ class Panel:
     bounds: tuple[float, float] | None = None
 
 
-def figure(panels: Sequence[Panel], standalone: bool = False) -> str:
+def figure(panels: Sequence[Panel], standalone: bool = False, width: int = WIDTH) -> str:
     """Draw panels below each other.
 
     Args:
         panels: At least one.
         standalone: True for a file of its own: with name space and style.
+        width: Of its own coordinates [px]; letters look larger on the page when it is less.
 
     Returns:
         An ``<svg>`` element.
     """
     height = sum(panel.height for panel in panels)
-    head = f'<svg class="plot" viewBox="0 0 {WIDTH} {height}" role="img"'
+    head = f'<svg class="plot" viewBox="0 0 {width} {height}" role="img"'
     parts = [head + (' xmlns="http://www.w3.org/2000/svg">' if standalone else ">")]
     if standalone:
         parts.append(f"<style>{STYLE}</style>")
-        parts.append(f'<rect width="{WIDTH}" height="{height}" fill="#fff"/>')
+        parts.append(f'<rect width="{width}" height="{height}" fill="#fff"/>')
     top = 0
     for panel in panels:
-        parts.append(f'<g transform="translate(0 {top})">{_panel(panel)}</g>')
+        parts.append(f'<g transform="translate(0 {top})">{_panel(panel, width)}</g>')
         top += panel.height
     return "".join(parts) + "</svg>"
 
@@ -100,10 +101,10 @@ def spans_where(times: Array, mask: Array) -> list[tuple[float, float]]:
     ]
 
 
-def _panel(panel: Panel) -> str:
+def _panel(panel: Panel, width: int) -> str:
     low, high = panel.bounds or _range(panel)
     begin, end = float(panel.times[0]), float(panel.times[-1])
-    right, bottom = WIDTH - _RIGHT, panel.height - _BOTTOM
+    right, bottom = width - _RIGHT, panel.height - _BOTTOM
 
     def x(time: float) -> float:
         return _LEFT + (time - begin) / max(end - begin, 1e-9) * (right - _LEFT)
@@ -113,9 +114,9 @@ def _panel(panel: Panel) -> str:
 
     out = [f'<text class="head" x="{_LEFT}" y="18">{escape(panel.title)}</text>']
     for a, b in panel.spans:
-        width = max(x(b) - x(a), 1.0)
+        wide = max(x(b) - x(a), 1.0)
         out.append(
-            f'<rect class="span" x="{x(a):.1f}" y="{_TOP}" width="{width:.1f}" '
+            f'<rect class="span" x="{x(a):.1f}" y="{_TOP}" width="{wide:.1f}" '
             f'height="{bottom - _TOP}"/>'
         )
     for value in _ticks(low, high, 5):
@@ -127,7 +128,7 @@ def _panel(panel: Panel) -> str:
     out += [
         f'<text x="{x(time):.1f}" y="{bottom + 16}" text-anchor="middle">{time:g}'
         f"{' s' if time >= end - 1e-9 else ''}</text>"
-        for time in _ticks(begin, end, 10)
+        for time in _ticks(begin, end, 10 if width > 600 else 5)
     ]
     out += [
         f'<path class="limit" d="M{_LEFT} {y(level):.1f}H{right}"/>'

@@ -50,8 +50,9 @@ def found(short):
 
 
 def test_rivals_are_always_in_the_table(found):
-    assert [figures.name for figures in found.figures] == ["thondel2014", "yardstick", "no motion"]
-    assert [driven.name for driven in found.drives] == ["thondel2014", "yardstick", "no motion"]
+    names = ["thondel2014", "yardstick", "hindsight", "no motion"]
+    assert [figures.name for figures in found.figures] == names
+    assert [driven.name for driven in found.drives] == names
     assert found.violations == 0
     assert found.rejected == 0
     with pytest.raises(KeyError):
@@ -81,8 +82,11 @@ def test_json_holds_every_figure(found, short):
     first = data["results"][0]
     assert first["rmse_xy"] == found.figures[0].rmse_xy
     assert [axis["axis"] for axis in first["axes"]] == ["f_x", "f_y", "f_z", "w_x", "w_y", "w_z"]
-    assert data["results"][2]["planning"] is None
+    assert data["results"][3]["planning"] is None
     assert data["yardstick"]["gain"] == found.yardstick.gain
+    assert data["hindsight"]["gain"] == found.hindsight.washout.gain
+    assert len(data["hindsight"]["screened"]) == 63
+    assert data["disturbance"] is None
     assert "NaN" not in to_json(found)
 
 
@@ -99,9 +103,10 @@ def test_text_is_aligned_and_names_the_rule(found):
     text = to_text(found)
     assert "gain in (0, 1] of least RMSE(x, y)" in text
     assert "as it must be" in text
+    assert "hindsight: classical washout with gain and corners chosen" in text
     assert f"machine t2-compact ({MACHINE.digest})" in text
     rows = [row for section in sections(found) for row in section.rows]
-    assert all(len(row.cells) == 3 for row in rows)
+    assert all(len(row.cells) == 4 for row in rows)
     lines = [line for line in text.splitlines() if line.startswith("  ") and "nRMSE" in line]
     assert len({len(line) for line in lines}) == 1
 
@@ -148,6 +153,7 @@ def test_progress_goes_to_standard_error(short, tmp_path, capsys):
         ({"scale": float("nan")}, "--scale"),
         ({"rate": 5.0}, "--rate: 5 Hz"),
         ({"planner_hz": 1000.0}, "--planner-rate"),
+        ({"preview": 5.0}, "--preview: 5 s"),
         ({"json_out": "nowhere/figures.json"}, "--json nowhere.*no file in an existing folder"),
         ({"html_out": "."}, "--html"),
         ({"algorithms": ["classical", "thondel2014"], "setpoints": "x.csv"}, "--setpoints"),

@@ -14,6 +14,7 @@ from motionserver.evaluate.metrics.fidelity import (
     axis_figures,
     ratio,
 )
+from motionserver.evaluate.metrics.horizontal import HorizontalFigures, horizontal_figures
 from motionserver.evaluate.metrics.linear import rms
 from motionserver.evaluate.metrics.perceived import perceived
 from motionserver.evaluate.metrics.planning import PlanningFigures, planning_figures
@@ -31,6 +32,7 @@ class Figures:
         name: Algorithm or rival.
         rmse_xy: RMSE of the horizontal specific force, x and y together [m/s2].
         nrmse_xy: The same over the rms of the reference; None if that is nothing.
+        xy: More about x and y together.
         axes: f_x, f_y, f_z, w_x, w_y, w_z.
         comfort: Incongruence, tilt, washout.
         workspace: Margins and violations.
@@ -40,6 +42,7 @@ class Figures:
     name: str
     rmse_xy: float
     nrmse_xy: float | None
+    xy: HorizontalFigures
     axes: tuple[AxisFigures, ...]
     comfort: ComfortFigures
     workspace: WorkspaceFigures
@@ -78,6 +81,13 @@ def figures_of(drive: Drive) -> Figures:
         drive.name,
         error,
         ratio(error, rms(drive.wanted_force[:, :2]), 0.05 * FORCE_THRESHOLD),
+        horizontal_figures(
+            drive.wanted_force[:, :2],
+            force[:, :2],
+            sensed_wanted[:, :2],
+            sensed_felt[:, :2],
+            dt,
+        ),
         axes,
         comfort_figures(
             drive.wanted_force, drive.wanted_rates, force, rates, drive.acceleration, dt

@@ -1,0 +1,1 @@
+"""All recordings of a folder, all algorithms, all rivals, in one table."""

@@ -1,0 +1,152 @@
+"""Drive all tasks in parallel; what is known already is read from the folder."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+from time import perf_counter
+from typing import Any, Final
+
+import numpy as np
+
+from motionserver.core.axes import Array
+from motionserver.evaluate.compare.contenders import Task
+from motionserver.evaluate.drive import Drive, no_motion
+from motionserver.evaluate.hindsight import find_hindsight
+from motionserver.evaluate.lockstep import drive
+from motionserver.evaluate.metrics.figures import figures_of
+from motionserver.evaluate.recording import read_recording
+from motionserver.evaluate.yardstick import find_yardstick
+
+CURVE_HZ: Final = 20.0
+"""Rate of the curves that are kept for the page [Hz]."""
+Result = dict[str, Any]
+"""Figures of one task as plain numbers, see `drive_task`."""
+Told = Callable[[str], None]
+
+
+def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Result | None]:
+    """Results in the order of the tasks.
+
+    Args:
+        tasks: What to drive.
+        folder: Keeps every result by the hash of what it depends on; begun runs go on.
+        jobs: Processes at the same time.
+        tell: Called with a line of progress.
+
+    Returns:
+        One result per task; None where it raised, which is told.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{task.key()}.json" for task in tasks]
+    results: list[Result | None] = [_kept(file) for file in files]
+    missing = [index for index, result in enumerate(results) if result is None]
+    tell(f"{len(tasks)} drives, {len(tasks) - len(missing)} of them known already")
+    done = 0
+
+    def take(index: int, result: Result | None, error: str) -> None:
+        nonlocal done
+        done += 1
+        task = tasks[index]
+        name = f"{task.recording.stem}: {task.contender.label}"
+        results[index] = result
+        if result is None:
+            tell(f"{done}/{len(missing)} {name}: FAILED: {error}")
+            return
+        nrmse = result["figures"]["nrmse_xy"]
+        shown = "-" if nrmse is None else f"{nrmse:.3f}"
+        tell(f"{done}/{len(missing)} {name}: nRMSE {shown} in {result['seconds']:.0f} s")
+
+    if jobs <= 1 or len(missing) < 2:
+        for index in missing:
+            take(index, *_guarded(tasks[index], files[index]))
+        return results
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(missing)), context) as pool:
+        # the searches take longest: first, so that no core waits for them in the end
+        order = sorted(missing, key=lambda index: tasks[index].contender.way != "")
+        futures = {pool.submit(_guarded, tasks[index], files[index]): index for index in order}
+        for future in as_completed(futures):
+            take(futures[future], *future.result())
+    return results
+
+
+def drive_task(task: Task) -> Result:
+    """Drive and judge one task.
+
+    Returns:
+        ``figures`` (as of `figures_of`), ``note`` (how a rival was found), ``seconds`` it took,
+        ``curves``: t [s], wanted and felt f_x, f_y [m/s2] at `CURVE_HZ`.
+    """
+    begun = perf_counter()
+    recording, machine, contender = read_recording(task.recording), task.machine, task.contender
+    rate, planner_hz, tuning = task.rate, task.planner_hz, contender.tuning
+    note = ""
+    if contender.name == "no motion":
+        driven = no_motion(machine, recording, tuning.scale, rate)
+    elif contender.name == "yardstick":
+        found = find_yardstick(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+        driven, note = found.drive, f"gain {found.gain:g}"
+    elif contender.name == "hindsight":
+        best = find_hindsight(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+        driven, note = best.drive, best.described()
+    else:
+        driven = drive(
+            machine,
+            recording,
+            tuning,
+            rate=rate,
+            planner_hz=planner_hz,
+            preview=contender.preview,
+            disturbance=contender.disturbance,
+        )
+    return {
+        "recording": recording.name,
+        "duration": recording.duration,
+        "contender": contender.label,
+        "note": note,
+        "figures": asdict(figures_of(driven)),
+        "curves": _curves(driven),
+        "seconds": perf_counter() - begun,
+    }
+
+
+def _guarded(task: Task, file: Path) -> tuple[Result | None, str]:
+    try:
+        result = drive_task(task)
+    except Exception as error:
+        # one drive that fails must not take hours of others with it
+        return None, f"{type(error).__name__}: {error}"
+    scratch = file.with_suffix(f".{os.getpid()}.tmp")
+    scratch.write_text(json.dumps(result, allow_nan=False), encoding="utf-8")
+    scratch.replace(file)
+    return result, ""
+
+
+def _kept(file: Path) -> Result | None:
+    try:
+        result = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return result if isinstance(result, dict) else None
+
+
+def _curves(driven: Drive) -> dict[str, list[float]]:
+    stride = max(1, round(driven.rate / CURVE_HZ))
+    force, _ = driven.felt()
+
+    def thin(values: Array) -> list[float]:
+        return [float(value) for value in np.round(values[::stride], 3)]
+
+    return {
+        "t": thin(driven.times),
+        "wanted_x": thin(driven.wanted_force[:, 0]),
+        "wanted_y": thin(driven.wanted_force[:, 1]),
+        "felt_x": thin(force[:, 0]),
+        "felt_y": thin(force[:, 1]),
+    }

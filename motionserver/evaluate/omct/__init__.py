@@ -1,0 +1,1 @@
+"""Objective motion cueing test: frequency responses of the whole server, sine by sine."""

@@ -1,0 +1,183 @@
+"""From what a person writes at the prompt to machine, tuning and disturbance."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, replace
+from math import isfinite, radians
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from motionserver.core.limits import Machine
+from motionserver.cueing.reference import MODELS
+from motionserver.cueing.tuning import Tuning
+from motionserver.errors import ConfigError
+from motionserver.evaluate.disturbance import Disturbance
+from motionserver.evaluate.drive import RATE_HZ
+from motionserver.evaluate.lockstep import PLANNER_HZ
+from motionserver.settings.fields import TuningError
+from motionserver.settings.machine import load_machine
+from motionserver.settings.tuning import apply_changes, default_for
+from motionserver.settings.tuning_presets import NAME, PresetShelf
+
+FREE_DEG_S: Final = 1000.0
+"""The tilt rate that is called "free" [deg/s]."""
+_FARTHEST: Final = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluateOptions:
+    """What was written at the prompt, as it was written.
+
+    Attributes:
+        algorithm: Names, comma between.
+        platform: Preset or file of the machine.
+        scale: Share of the motion that is wanted; None for the tuning's.
+        rate: Rate of judging [Hz].
+        planner_hz: Planner rate [Hz].
+        head: ``X,Y,Z`` [m], or empty.
+        reference: Reference model, or empty.
+        tilt_rate: In deg/s, "free", or empty.
+        preset: Preset or file of tunables, or empty.
+        preview: How far the recording is told ahead [s].
+        disturb: Whether planners are troubled.
+        seed: Of the trouble.
+        jobs: Processes at the same time.
+        setpoints: File for set-points, or None.
+        json_out: File for figures, or None.
+        html_out: File for the page, or None.
+    """
+
+    algorithm: str
+    platform: str = "t2-compact"
+    scale: float | None = None
+    rate: float = RATE_HZ
+    planner_hz: float = PLANNER_HZ
+    head: str = ""
+    reference: str = ""
+    tilt_rate: str = ""
+    preset: str = ""
+    preview: float = 0.0
+    disturb: bool = False
+    seed: int = 0
+    jobs: int = 2
+    setpoints: Path | None = None
+    json_out: Path | None = None
+    html_out: Path | None = None
+
+    def algorithms(self) -> list[str]:
+        """Names of algorithms."""
+        return [name.strip() for name in self.algorithm.split(",") if name.strip()]
+
+    def machine(self) -> Machine:
+        """The platform with the head where it is wanted."""
+        return machine_at(load_machine(self.platform), self.head)
+
+    def tuning(self) -> Tuning:
+        """All tunables."""
+        return tuning_from(self.machine(), self.preset, self.reference, self.tilt_rate, self.scale)
+
+    def disturbance(self) -> Disturbance | None:
+        """The trouble, if any is wanted."""
+        return Disturbance(seed=self.seed) if self.disturb else None
+
+
+def machine_at(machine: Machine, head: str) -> Machine:
+    """The machine with its head point at ``X,Y,Z`` [m]; as it is if empty.
+
+    Raises:
+        ConfigError: These are not three numbers of a head.
+    """
+    if not head:
+        return machine
+    parts = head.split(",")
+    try:
+        point = [float(part) for part in parts]
+    except ValueError:
+        point = []
+    if len(point) != 3 or not all(abs(value) <= _FARTHEST for value in point):
+        raise ConfigError(
+            "--head",
+            f"{head!r} is not X,Y,Z of the driver's head from the reference point",
+            f"Give three numbers in metres, each at most {_FARTHEST:g}, for example 0,0,0.7.",
+        )
+    return machine.with_head(np.array(point))
+
+
+def tuning_from(
+    machine: Machine,
+    preset: str = "",
+    reference: str = "",
+    tilt_rate: str = "",
+    scale: float | None = None,
+) -> Tuning:
+    """Tunables: the defaults on this machine, then the preset, then what is said singly.
+
+    Args:
+        machine: Its box bounds the tuning's.
+        preset: Name of a shipped preset, or a file of the same form (TOML, a table ``values``).
+        reference: Reference model of surge and sway.
+        tilt_rate: In deg/s, or "free".
+        scale: Share of the motion that is wanted.
+
+    Raises:
+        ConfigError: One of them is wrong.
+    """
+    values: dict[str, Any] = _values(preset) if preset else {}
+    if reference:
+        if reference not in MODELS:
+            raise ConfigError(
+                "--reference",
+                f"unknown model {reference!r}",
+                f"Allowed: {', '.join(MODELS)}; what comes ahead is told by --preview.",
+            )
+        values["reference"] = reference
+    try:
+        model = apply_changes(default_for(machine), values)
+        model.check_machine(machine)
+    except TuningError as error:
+        raise ConfigError(f"--tuning {preset}", str(error), "Correct this value.") from error
+    tuning = model.to_tuning()
+    if tilt_rate:
+        tuning = replace(tuning, tilt_rate=_rate(tilt_rate))
+    return tuning if scale is None else replace(tuning, scale=scale)
+
+
+def _rate(text: str) -> float:
+    """Radians per second; judging may go beyond what may be tuned while it moves."""
+    try:
+        rate = FREE_DEG_S if text == "free" else float(text)
+    except ValueError:
+        rate = float("nan")
+    if not (isfinite(rate) and 0.1 <= rate <= FREE_DEG_S):
+        raise ConfigError(
+            "--tilt-rate", f"{text!r} is out of range", 'Give 0.1 to 1000 deg/s, or "free".'
+        )
+    return radians(rate)
+
+
+def _values(preset: str) -> dict[str, Any]:
+    path = Path(preset)
+    shelf = PresetShelf(Path("no-user-presets"))
+    built_in = [name for name in shelf.names() if NAME.fullmatch(name)]
+    if path.suffix != ".toml":
+        try:
+            return dict(shelf.read(preset).values)
+        except (TuningError, KeyError, OSError) as error:
+            raise ConfigError(
+                "--tuning",
+                f"no preset {preset!r} ({error})",
+                f"Give a file ending in .toml or one of {', '.join(built_in)}.",
+            ) from error
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"--tuning {preset}", f"cannot be read ({error})", "Mend it.") from error
+    values = data.get("values")
+    if not isinstance(values, dict):
+        raise ConfigError(
+            f"--tuning {preset}", "has no table [values]", "Write it like the shipped presets."
+        )
+    return values
