@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 from motionserver.solvers.base import QpBackend
 
@@ -12,26 +12,35 @@ BACKENDS: Final = {
     "osqp": ("motionserver.solvers.osqp", "Osqp"),
     "piqp": ("motionserver.solvers.piqp", "Piqp"),
 }
-"""Module and class of every backend; imported when first asked for."""
+"""Module and class of every dense backend; imported when first asked for."""
 
 
-def make_backend(name: str) -> QpBackend:
+def make_backend(name: str, iterations: int | None = None) -> QpBackend:
     """Make a fresh backend.
 
     Args:
         name: One of `BACKENDS`.
+        iterations: Fixed budget of iterations; None is the backend's own. See `QpBackend` for what
+            a result is worth when it is used up.
 
     Raises:
-        ValueError: There is no such backend, or its library cannot be imported.
+        ValueError: There is no such backend, its library cannot be imported, or the budget is not
+            positive.
     """
     if name not in BACKENDS:
         raise ValueError(
             f"QP backend {name!r} does not exist; allowed: {', '.join(BACKENDS)}; "
             "change tuning.backend"
         )
+    if iterations is not None and iterations < 1:
+        raise ValueError(
+            f"QP backend {name!r}: a budget of {iterations} iterations finds nothing; allowed is "
+            "1 or more, or None for the backend's own"
+        )
     module, cls = BACKENDS[name]
+    budget: dict[str, Any] = {} if iterations is None else {"iterations": iterations}
     try:
-        backend: QpBackend = getattr(import_module(module), cls)()
+        backend: QpBackend = getattr(import_module(module), cls)(**budget)
     except ImportError as error:
         raise ValueError(
             f"QP backend {name!r} cannot be imported ({error}); install the library "

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -47,6 +49,7 @@ class BackendContract:
 
     name: str
     accuracy = 1e-4
+    sound_when_cut_short = True
 
     @pytest.fixture
     def backend(self):
@@ -148,14 +151,39 @@ class BackendContract:
             backend.solve(*programme(3, n=13))
 
     def test_budget(self):
-        cls = type(make_backend(self.name))
         vectors, matrices = programme(5)
-        result = cls(iterations=1).solve(vectors, matrices)
+        backend = make_backend(self.name, iterations=1)
+        result = backend.solve(vectors, matrices)
         assert result.status in (QpStatus.BUDGET, QpStatus.FAILED)
+        assert result.iterations <= 1
+        assert result.usable == (self.sound_when_cut_short and result.status is QpStatus.BUDGET)
+        assert not result.usable or np.isfinite(result.x).all()
+
+    def test_solved_is_usable_and_nothing_else_without_a_budget(self, backend):
+        vectors, matrices = programme(4)
+        assert backend.solve(vectors, matrices).usable
+        poisoned = replace(vectors, q=np.full_like(vectors.q, np.nan))
+        assert not backend.solve(poisoned).usable
+
+    def test_bounds_that_cross_are_infeasible(self, backend):
+        vectors, matrices = programme(4)
+        crossed = replace(vectors, lower=vectors.upper + 1.0)
+        result = backend.solve(crossed, matrices)
+        assert result.status is QpStatus.INFEASIBLE
+        assert not result.usable
+        assert backend.solve(vectors).status is QpStatus.SOLVED
+
+    def test_matrices_that_were_not_finite_were_not_taken(self, backend):
+        vectors, matrices = programme(4)
+        bad = QpMatrices(matrices.H, np.full_like(matrices.A, np.nan))
+        assert backend.solve(vectors, bad).status is QpStatus.FAILED
+        assert backend.solve(vectors).status is QpStatus.FAILED
+        assert backend.solve(vectors, matrices).status is QpStatus.SOLVED
 
 
 class TestDaqp(BackendContract):
     name = "daqp"
+    sound_when_cut_short = False
 
 
 class TestPiqp(BackendContract):
@@ -180,6 +208,11 @@ def test_exact_backends_agree_and_are_optimal(seed):
 def test_unknown_backend_names_the_known_ones():
     with pytest.raises(ValueError, match="daqp, osqp, piqp"):
         make_backend("gurobi")
+
+
+def test_a_budget_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="1 or more"):
+        make_backend("piqp", iterations=0)
 
 
 def test_registry_is_complete():
