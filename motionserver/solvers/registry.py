@@ -11,8 +11,21 @@ BACKENDS: Final = {
     "daqp": ("motionserver.solvers.daqp", "Daqp"),
     "osqp": ("motionserver.solvers.osqp", "Osqp"),
     "piqp": ("motionserver.solvers.piqp", "Piqp"),
+    "hpipm": ("motionserver.solvers.hpipm", "Hpipm"),
 }
-"""Module and class of every dense backend; imported when first asked for."""
+"""Module and class of every backend; imported when first asked for."""
+
+OPTIONAL: Final = frozenset({"hpipm"})
+"""Backends whose library is an extra of the package."""
+
+
+def present(name: str) -> bool:
+    """Whether a backend of `BACKENDS` can be made here."""
+    try:
+        make_backend(name)
+    except ValueError:
+        return False
+    return True
 
 
 def make_backend(name: str, iterations: int | None = None) -> QpBackend:
@@ -42,8 +55,10 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
     try:
         backend: QpBackend = getattr(import_module(module), cls)(**budget)
     except ImportError as error:
+        what = f"motionserver[{name}]" if name in OPTIONAL else name
+        others = ", ".join(other for other in BACKENDS if other not in OPTIONAL)
         raise ValueError(
-            f"QP backend {name!r} cannot be imported ({error}); install the library "
-            f"{name!r} or choose another of {', '.join(BACKENDS)}"
+            f"QP backend {name!r} cannot be loaded ({error}); pip install '{what}', or change "
+            f"tuning.backend to one of {others}"
         ) from error
     return backend

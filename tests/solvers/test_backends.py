@@ -5,8 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from motionserver.solvers import hpipm_library
 from motionserver.solvers.base import QpMatrices, QpStatus, QpVectors
-from motionserver.solvers.registry import BACKENDS, make_backend
+from motionserver.solvers.registry import BACKENDS, make_backend, present
+
+needs_hpipm = pytest.mark.skipif(not present("hpipm"), reason="needs the extra hpipm")
 
 
 def programme(seed, n=12, m=20, b=8):
@@ -190,6 +193,11 @@ class TestPiqp(BackendContract):
     name = "piqp"
 
 
+@needs_hpipm
+class TestHpipm(BackendContract):
+    name = "hpipm"
+
+
 class TestOsqp(BackendContract):
     name = "osqp"
     accuracy = 5e-3
@@ -206,8 +214,21 @@ def test_exact_backends_agree_and_are_optimal(seed):
 
 
 def test_unknown_backend_names_the_known_ones():
-    with pytest.raises(ValueError, match="daqp, osqp, piqp"):
+    with pytest.raises(ValueError, match="daqp, osqp, piqp, hpipm"):
         make_backend("gurobi")
+
+
+def test_a_missing_library_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(hpipm_library, "SHIPPED_BY", "no_such_package")
+    hpipm_library.library.cache_clear()
+    try:
+        with pytest.raises(
+            ValueError, match=r"no_such_package.*pip install 'motionserver\[hpipm\]'"
+        ):
+            make_backend("hpipm")
+        assert not present("hpipm")
+    finally:
+        hpipm_library.library.cache_clear()
 
 
 def test_a_budget_of_nothing_is_refused():
@@ -216,4 +237,5 @@ def test_a_budget_of_nothing_is_refused():
 
 
 def test_registry_is_complete():
-    assert {make_backend(name).name for name in BACKENDS} == set(BACKENDS)
+    there = [name for name in BACKENDS if present(name)]
+    assert {make_backend(name).name for name in there} == set(there) >= {"daqp", "osqp", "piqp"}
