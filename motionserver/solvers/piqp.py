@@ -30,6 +30,7 @@ class Piqp(DenseBackend):
         self._iterations = iterations
         self._tolerance = tolerance
         self._solver: piqp.DenseSolver | None = None
+        self._absent: np.ndarray = np.empty(0, dtype=bool)
 
     def _keep(self, matrices: QpMatrices) -> QpMatrices:
         return QpMatrices(
@@ -42,15 +43,22 @@ class Piqp(DenseBackend):
         box_lower, box_upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
         box_lower[:b], box_upper[:b] = bounds.lower[:b], bounds.upper[:b]
         limits = {"x_l": box_lower, "x_u": box_upper}
-        rows = len(bounds.lower) > b
-        if rows:
-            limits |= {"h_l": bounds.lower[b:], "h_u": bounds.upper[b:]}
-        table = matrices.A if rows else None
+        table, lower, upper = matrices.A, bounds.lower[b:], bounds.upper[b:]
+        absent = np.isinf(lower) & np.isinf(upper)
+        if absent.any():
+            # it writes a complaint to the terminal about every row without a bound
+            table = np.where(absent[:, None], 0.0, table)
+            lower, upper = np.where(absent, -1.0, lower), np.where(absent, 1.0, upper)
+        fresh = fresh or not np.array_equal(absent, self._absent)
+        self._absent = absent
+        if len(lower):
+            limits |= {"h_l": lower, "h_u": upper}
+        rows = table if len(lower) else None
         if self._solver is None:
             self._solver = self._fresh()
-            self._solver.setup(matrices.H, q, G=table, **limits)
+            self._solver.setup(matrices.H, q, G=rows, **limits)
         elif fresh:
-            self._solver.update(P=matrices.H, c=q, G=table, **limits)
+            self._solver.update(P=matrices.H, c=q, G=rows, **limits)
         else:
             self._solver.update(c=q, **limits)
         status = _ENDINGS.get(self._solver.solve(), QpStatus.FAILED)

@@ -15,6 +15,9 @@ BACKENDS: Final = {
 }
 """Module and class of every backend; imported when first asked for."""
 
+REFERENCE: Final = "reference"
+"""Name of a backend that may take its time and errs by 1e-9: for benchmarks and tests."""
+
 OPTIONAL: Final = frozenset({"hpipm"})
 """Backends whose library is an extra of the package."""
 
@@ -32,7 +35,7 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
     """Make a fresh backend.
 
     Args:
-        name: One of `BACKENDS`.
+        name: One of `BACKENDS`, or `REFERENCE`.
         iterations: Fixed budget of iterations; None is the backend's own. See `QpBackend` for what
             a result is worth when it is used up.
 
@@ -40,6 +43,9 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
         ValueError: There is no such backend, its library cannot be imported, or the budget is not
             positive.
     """
+    if name == REFERENCE:
+        # not among the backends: nobody shall drive with it
+        return _make("piqp", {"iterations": iterations or 200, "tolerance": 1e-9})
     if name not in BACKENDS:
         raise ValueError(
             f"QP backend {name!r} does not exist; allowed: {', '.join(BACKENDS)}; "
@@ -50,10 +56,13 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
             f"QP backend {name!r}: a budget of {iterations} iterations finds nothing; allowed is "
             "1 or more, or None for the backend's own"
         )
+    return _make(name, {} if iterations is None else {"iterations": iterations})
+
+
+def _make(name: str, options: dict[str, Any]) -> QpBackend:
     module, cls = BACKENDS[name]
-    budget: dict[str, Any] = {} if iterations is None else {"iterations": iterations}
     try:
-        backend: QpBackend = getattr(import_module(module), cls)(**budget)
+        backend: QpBackend = getattr(import_module(module), cls)(**options)
     except ImportError as error:
         what = f"motionserver[{name}]" if name in OPTIONAL else name
         others = ", ".join(other for other in BACKENDS if other not in OPTIONAL)

@@ -168,6 +168,20 @@ class BackendContract:
         poisoned = replace(vectors, q=np.full_like(vectors.q, np.nan))
         assert not backend.solve(poisoned).usable
 
+    def test_rows_without_bounds_say_nothing_at_all(self, backend, capfd):
+        vectors, matrices = programme(6)
+        every = np.arange(len(vectors.upper))
+        for kept in (every % 2 == 0, every % 3 == 0, every < 0, every >= 0):
+            some = replace(vectors, upper=np.where(kept, vectors.upper, np.inf))
+            left = QpMatrices(matrices.H, matrices.A[kept])
+            only = replace(vectors, lower=vectors.lower[kept], upper=vectors.upper[kept])
+            wanted = make_backend(self.name).solve(only, left).x
+            for given in (matrices, None):
+                found = backend.solve(some, given)
+                assert found.x == pytest.approx(wanted, abs=20 * self.accuracy)
+            backend.solve(vectors, None)
+        assert capfd.readouterr() == ("", "")
+
     def test_bounds_that_cross_are_infeasible(self, backend):
         vectors, matrices = programme(4)
         crossed = replace(vectors, lower=vectors.upper + 1.0)
