@@ -99,7 +99,7 @@ def test_kernel_and_sentinel_stand_beside_each_case():
 
 
 def test_a_case_that_does_not_exist_is_named():
-    with pytest.raises(BenchError, match="'quadratic'.*mpc daqp"):
+    with pytest.raises(BenchError, match=r"'quadratic'.*mpc daqp"):
         bench_plan(PlanBench(5, only="quadratic"))
 
 

@@ -176,8 +176,8 @@ class BackendContract:
             left = QpMatrices(matrices.H, matrices.A[kept])
             only = replace(vectors, lower=vectors.lower[kept], upper=vectors.upper[kept])
             wanted = make_backend(self.name).solve(only, left).x
-            for given in (matrices, None):
-                found = backend.solve(some, given)
+            for handed in (matrices, None):
+                found = backend.solve(some, handed)
                 assert found.x == pytest.approx(wanted, abs=20 * self.accuracy)
             backend.solve(vectors, None)
         assert capfd.readouterr() == ("", "")
