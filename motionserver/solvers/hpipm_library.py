@@ -38,6 +38,7 @@ _CALLS: Final = {
     "ipm_arg_create": (_POINTER,) * 3,
     "ipm_arg_set_default": (_INT, _POINTER),
     "ipm_arg_set_iter_max": (_POINTER,) * 2,
+    "ipm_arg_set_mu0": (_POINTER,) * 2,
     "ipm_arg_set_tol_stat": (_POINTER,) * 2,
     "ipm_arg_set_tol_eq": (_POINTER,) * 2,
     "ipm_arg_set_tol_ineq": (_POINTER,) * 2,

@@ -33,6 +33,7 @@ class Memory:
         iterations: Budget.
         tolerance: At which it stops.
         exact: Take the mode that looks for accuracy, not the one that looks for speed.
+        barrier: Complementarity it begins with.
 
     Attributes:
         lower: Lower bounds of all rows as handed over, (sum of g,); written by the caller.
@@ -41,7 +42,7 @@ class Memory:
         first_r: Cost of its inputs likewise, (k,).
     """
 
-    def __init__(self, sizes: Sizes, iterations: int, tolerance: float, exact: bool) -> None:
+    def __init__(self, sizes: Sizes, iterations: int, tolerance: float, exact: bool, barrier: float) -> None:
         self._c = library()
         self.sizes = sizes
         states, inputs, rows, soft = (list(column) for column in zip(*sizes, strict=True))
@@ -58,6 +59,7 @@ class Memory:
         self._create(states, inputs, rows, soft)
         self._c.d_ocp_qp_ipm_arg_set_default(_BALANCE if exact else _SPEED_ABS, self._arg)
         self._set("iter_max", ctypes.c_int(iterations))
+        self._set("mu0", ctypes.c_double(barrier))
         for what in ("tol_stat", "tol_eq", "tol_ineq", "tol_comp"):
             self._set(what, ctypes.c_double(tolerance))
         # the residuals tell whether the rows have been met at all
