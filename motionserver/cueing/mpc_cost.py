@@ -51,6 +51,19 @@ class Cost:
         self._linear = np.zeros(layout.size)
         self.weigh(tuning)
 
+    @property
+    def factor(self) -> Array:
+        """Weighted derivatives F of the outputs by the coefficients after `fill`: F'F is in H.
+
+        (N nodes, outputs, 6 axes, K); each row is of one instant alone.
+        """
+        return self._outputs
+
+    @property
+    def prices(self) -> Array:
+        """Of pose, velocity and acceleration at the nodes, per axis, (3, 6)."""
+        return self._prices
+
     def weigh(self, tuning: Tuning) -> None:
         """Take other weights.
 

@@ -42,7 +42,9 @@ class Memory:
         first_r: Cost of its inputs likewise, (k,).
     """
 
-    def __init__(self, sizes: Sizes, iterations: int, tolerance: float, exact: bool, barrier: float) -> None:
+    def __init__(
+        self, sizes: Sizes, iterations: int, tolerance: float, exact: bool, barrier: float
+    ) -> None:
         self._c = library()
         self.sizes = sizes
         states, inputs, rows, soft = (list(column) for column in zip(*sizes, strict=True))

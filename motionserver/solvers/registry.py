@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from motionserver.solvers.base import QpBackend
+from motionserver.solvers.stage import StageBackend
 
 BACKENDS: Final = {
     "daqp": ("motionserver.solvers.daqp", "Daqp"),
@@ -17,6 +18,9 @@ BACKENDS: Final = {
 
 REFERENCE: Final = "reference"
 """Name of a backend that may take its time and errs by 1e-9: for benchmarks and tests."""
+
+STAGED: Final = {"hpipm": ("motionserver.solvers.hpipm", "HpipmStages")}
+"""Module and class of those that also solve programmes by stages."""
 
 OPTIONAL: Final = frozenset({"hpipm"})
 """Backends whose library is an extra of the package."""
@@ -59,10 +63,32 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
     return _make(name, {} if iterations is None else {"iterations": iterations})
 
 
+def make_stage_backend(name: str, iterations: int | None = None) -> StageBackend:
+    """Make a fresh solver of stage programmes.
+
+    Args:
+        name: One of `STAGED`.
+        iterations: Fixed budget of iterations; None is the backend's own.
+
+    Raises:
+        ValueError: There is no such backend, or its library cannot be imported.
+    """
+    if name not in STAGED:
+        raise ValueError(f"stage backend {name!r} does not exist; allowed: {', '.join(STAGED)}")
+    options = {} if iterations is None else {"iterations": iterations}
+    backend: StageBackend = _made(name, STAGED[name], options)
+    return backend
+
+
 def _make(name: str, options: dict[str, Any]) -> QpBackend:
-    module, cls = BACKENDS[name]
+    backend: QpBackend = _made(name, BACKENDS[name], options)
+    return backend
+
+
+def _made(name: str, where: tuple[str, str], options: dict[str, Any]) -> Any:  # noqa: ANN401
+    module, cls = where
     try:
-        backend: QpBackend = getattr(import_module(module), cls)(**options)
+        return getattr(import_module(module), cls)(**options)
     except ImportError as error:
         what = f"motionserver[{name}]" if name in OPTIONAL else name
         others = ", ".join(other for other in BACKENDS if other not in OPTIONAL)
@@ -70,4 +96,3 @@ def _make(name: str, options: dict[str, Any]) -> QpBackend:
             f"QP backend {name!r} cannot be loaded ({error}); pip install '{what}', or change "
             f"tuning.backend to one of {others}"
         ) from error
-    return backend
