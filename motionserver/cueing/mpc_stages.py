@@ -91,7 +91,8 @@ class StagedProgramme:
             )
             for stage in range(count)
         ]
-        self._constant = np.zeros((count, 4, 4, _AXES))
+        self._at_nodes = frozen(np.stack([self._to_stage[stage] for stage in self._at]))
+        self._constant = np.zeros((count, 4 * _AXES, 4 * _AXES))
         self._capacity = np.zeros(count, dtype=int)
         self._prices = np.zeros((3, 6))
         self._programme: StageProgramme | None = None
@@ -104,16 +105,13 @@ class StagedProgramme:
         grid, maps = self._grid, self._grid.at_nodes
         self._constant[:] = 0.0
         for price, gains in zip(prices, (maps.pose, maps.velocity, maps.acceleration), strict=True):
-            for node, gain in enumerate(gains):
-                stage = self._at[node]
+            for gain, stage, share in zip(gains, self._at, grid.share, strict=True):
                 one = gain @ self._to_stage[stage]
-                self._constant[stage] += np.multiply.outer(
-                    grid.share[node] * np.outer(one, one), price
-                )
+                self._constant[stage] += np.kron(share * np.outer(one, one), np.diag(price))
         for piece, (gain, length) in enumerate(zip(grid.basis, np.diff(grid.edges), strict=True)):
             stage = min(piece, self.count - 1)
             one = gain @ self._to_stage[stage]
-            self._constant[stage] += JERK * length * np.outer(one, one)[..., None]
+            self._constant[stage] += np.kron(JERK * length * np.outer(one, one), np.eye(_AXES))
 
     def solve(self, vectors: QpVectors, matrices: QpMatrices | None = None) -> QpResult:
         """Solve the condensed programme by stages; see `QpBackend.solve`.
@@ -190,14 +188,13 @@ class StagedProgramme:
         price, curvature = linear[:slacks], np.diagonal(hessian)[:slacks]
         # a linear cost of the coefficients is one of the jerks that they are made of
         pull = self._to_coefficients.T @ linear[slacks:].reshape(_AXES, count).T
+        felt = np.matmul(factor.reshape(len(factor), -1, count), self._at_nodes)
+        felt = felt.reshape(-1, _AXES, 4).swapaxes(1, 2).reshape(len(factor), -1, 4 * _AXES)
         for number, stage in enumerate(programme.stages):
-            place, part = self._places[number], factor[self._node_parts[number]]
-            felt = part.reshape(-1, count) @ self._to_stage[number]
-            felt = felt.reshape(-1, _AXES, 4).transpose(0, 2, 1).reshape(-1, 4 * _AXES)
-            squares = felt.T @ felt
-            table = squares.reshape(4, _AXES, 4, _AXES)
-            for axis in range(_AXES):
-                table[:, axis, :, axis] += self._constant[number, :, :, axis]
+            place = self._places[number]
+            part = felt[self._node_parts[number]].reshape(-1, 4 * _AXES)
+            squares = part.T @ part
+            squares += self._constant[number]
             stage.Q[:_STATES, :_STATES] = squares[:_STATES, :_STATES]
             stage.S[:_AXES, :_STATES] = JERK_UNIT * squares[_STATES:, :_STATES]
             stage.R[:_AXES, :_AXES] = JERK_UNIT**2 * squares[_STATES:, _STATES:]
@@ -220,14 +217,15 @@ class StagedProgramme:
     ) -> None:
         count, slacks = self.count, self._slacks
         ends = np.searchsorted(stages, np.arange(count + 1))
+        rows, lower, upper = rows[order], vectors.lower[order], vectors.upper[order]
         for number, stage in enumerate(programme.stages):
             place = self._places[number]
             first = place.inputs - _AXES
-            chosen = order[ends[number] : ends[number + 1]]
-            here = slice(first, first + len(chosen))
+            chosen = slice(ends[number], ends[number + 1])
             part = rows[chosen]
+            here = slice(first, first + len(part))
             look = part[:, slacks:].reshape(-1, count) @ self._to_stage[number]
-            look = look.reshape(-1, _AXES, 4).transpose(0, 2, 1).reshape(-1, 4 * _AXES)
+            look = look.reshape(-1, _AXES, 4).swapaxes(1, 2).reshape(-1, 4 * _AXES)
             stage.C[here, :_STATES] = look[:, :_STATES]
             stage.D[here, :_AXES] = JERK_UNIT * look[:, _STATES:]
             stage.D[here, _AXES : _AXES + len(place.tilts)] = part[:, 1 + place.tilts]
@@ -235,5 +233,5 @@ class StagedProgramme:
                 stage.C[here, _STATES] = SLACK_UNIT * part[:, 0]
             else:
                 stage.D[here, -1] = SLACK_UNIT * part[:, 0]
-            stage.lower[here], stage.upper[here] = vectors.lower[chosen], vectors.upper[chosen]
+            stage.lower[here], stage.upper[here] = lower[chosen], upper[chosen]
             stage.lower[here.stop :], stage.upper[here.stop :] = -np.inf, np.inf

@@ -40,7 +40,7 @@ def tap(pieces, ticks, iterations, tuning=MPC):
 
     def make(machine, chosen, period):
         mpc = SixAxis(machine, chosen, period, pieces=pieces)
-        staged = StagedProgramme(mpc._grid, mpc._cost, HpipmStages(iterations, 1e-9))
+        staged = StagedProgramme(mpc._grid, mpc._cost, HpipmStages(iterations, 1e-9, exact=True))
         tapped.append(Tapped(staged))
         mpc._backend = tapped[0]
         return mpc
