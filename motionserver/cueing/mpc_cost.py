@@ -52,12 +52,13 @@ class Cost:
         self.weigh(tuning)
 
     @property
-    def factor(self) -> Array:
+    def factor(self) -> Array | None:
         """Weighted derivatives F of the outputs by the coefficients after `fill`: F'F is in H.
 
-        (N nodes, outputs, 6 axes, K); each row is of one instant alone.
+        (N nodes, outputs, 6 axes, K), each row of one instant alone; None where organs mix the
+        errors of several.
         """
-        return self._outputs
+        return None if self._perceived is not None else self._outputs
 
     @property
     def prices(self) -> Array:

@@ -52,7 +52,9 @@ def make_solver(name: str, grid: SplineGrid, cost: Cost) -> QpBackend:
         ValueError: There is no such backend, or its library is not there.
     """
     dense = make_backend(name)
-    return StagedProgramme(grid, cost, make_stage_backend(name)) if name in STAGED else dense
+    if name not in STAGED:
+        return dense
+    return StagedProgramme(grid, cost, make_stage_backend(name), dense)
 
 
 class StagedProgramme:
@@ -64,12 +66,15 @@ class StagedProgramme:
     Args:
         grid: The grid of plans.
         cost: What fills the programme's cost, asked for its factor at each solve.
-        backend: Solver.
+        backend: Solver of the stages.
+        dense: Solver for a cost that cannot be told by stages.
     """
 
-    def __init__(self, grid: SplineGrid, cost: Cost, backend: StageBackend) -> None:
+    def __init__(
+        self, grid: SplineGrid, cost: Cost, backend: StageBackend, dense: QpBackend
+    ) -> None:
         slacks = 1 + grid.pieces
-        self.name = backend.name
+        self.name, self._dense = backend.name, dense
         self._grid, self._cost, self._backend, self._slacks = grid, cost, backend, slacks
         self.count = count = grid.pieces - 2
         begins = jerk_maps(grid.edges, grid.edges[:count]).of(grid.basis)
@@ -121,10 +126,13 @@ class StagedProgramme:
         """
         if matrices is None:
             raise ValueError("six-axis MPC by stages: got no matrices; pass them at every solve")
+        factor = self._cost.factor
+        if factor is None:
+            return self._dense.solve(vectors, matrices)
         self._weigh(self._cost.prices)
         order, stages = self._sorted_rows(vectors, matrices.A)
         programme = self._sized(np.bincount(stages, minlength=self.count))
-        self._fill_cost(programme, vectors.q, matrices.H, self._cost.factor)
+        self._fill_cost(programme, vectors.q, matrices.H, factor)
         self._fill_rows(programme, vectors, matrices.A, order, stages)
         result = self._backend.solve(programme)
         x = np.full(len(vectors.q), np.nan)

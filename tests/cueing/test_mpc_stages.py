@@ -40,7 +40,9 @@ def tap(pieces, ticks, iterations, tuning=MPC):
 
     def make(machine, chosen, period):
         mpc = SixAxis(machine, chosen, period, pieces=pieces)
-        staged = StagedProgramme(mpc._grid, mpc._cost, HpipmStages(iterations, 1e-9, exact=True))
+        staged = StagedProgramme(
+            mpc._grid, mpc._cost, HpipmStages(iterations, 1e-9, exact=True), None
+        )
         tapped.append(Tapped(staged))
         mpc._backend = tapped[0]
         return mpc
@@ -84,6 +86,16 @@ def test_it_drives_like_the_optimum():
         for name in ("hpipm", "piqp")
     ]
     assert drives[0].outcomes["no plan"] == drives[0].outcomes["refused"] == 0
+    assert drives[0].force_rmse() == pytest.approx(drives[1].force_rmse(), rel=0.01)
+
+
+def test_a_cost_that_mixes_instants_is_solved_all_the_same():
+    tuning = replace(MPC, perception="telban-cardullo")
+    drives = [
+        time_plans(MACHINE, replace(tuning, backend=name), 15, paced=False, begin=LIVELY)
+        for name in ("hpipm", "piqp")
+    ]
+    assert drives[0].outcomes["no plan"] == 0
     assert drives[0].force_rmse() == pytest.approx(drives[1].force_rmse(), rel=0.01)
 
 
