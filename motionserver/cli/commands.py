@@ -383,8 +383,17 @@ def bench(
     json_out: Annotated[
         Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
     ] = None,
+    ticks: Annotated[
+        int | None, typer.Option("--ticks", help="plan: periods per case", metavar="N")
+    ] = None,
+    paced: Annotated[
+        bool, typer.Option("--paced/--unpaced", help="plan: wait for each period, as live")
+    ] = True,
+    only: Annotated[
+        str, typer.Option("--only", help="plan: cases whose name has this in it", metavar="WORD")
+    ] = "",
 ) -> None:
     """Measure lateness, plan times and latency beside a sentinel that only sleeps."""
     from motionserver.cli.offline import run_bench
 
-    raise typer.Exit(run_bench(what, seconds, json_out))
+    raise typer.Exit(run_bench(what, seconds, json_out, ticks, paced, only))

@@ -58,10 +58,17 @@ def run_reproduce(paper: str, out: Path) -> int:
     return reproduce(paper, out)
 
 
-def run_bench(what: str, seconds: float, json_out: Path | None) -> int:
+def run_bench(
+    what: str,
+    seconds: float,
+    json_out: Path | None,
+    ticks: int | None = None,
+    paced: bool = True,
+    only: str = "",
+) -> int:
     """Measure and print."""
     if what not in BENCHES:
         raise ConfigError("bench", f"unknown {what!r}", f"Allowed: {', '.join(BENCHES)}.")
     from motionserver.evaluate.bench.command import run_bench as measure
 
-    return measure(what, seconds, json_out)
+    return measure(what, seconds, json_out, ticks, paced, only)

@@ -25,11 +25,11 @@ from motionserver.cueing.mpc_grid import PIECES, make_spline_grid
 from motionserver.cueing.mpc_nominal import Nominal, Projection
 from motionserver.cueing.mpc_outputs import linearise
 from motionserver.cueing.mpc_rows import Rows
+from motionserver.cueing.mpc_stages import make_solver
 from motionserver.cueing.mpc_workspace import FREE, tuned_axes
 from motionserver.cueing.reference import Reference, believable
 from motionserver.cueing.tuning import Tuning
-from motionserver.solvers.base import QpMatrices, QpResult, QpStatus, QpVectors
-from motionserver.solvers.registry import make_backend
+from motionserver.solvers.base import QpMatrices, QpVectors
 
 RATE_CORNER: Final = 0.5
 """High-pass of the wanted body rates [rad/s]: turning on and on cannot be followed."""
@@ -70,11 +70,11 @@ class SixAxis:
     def _build(self, tuning: Tuning) -> None:
         grid = make_spline_grid(tuning.horizon, self._period, self._pieces)
         self._reference = self._make_reference(tuning, grid.nodes)
-        self._backend = make_backend(tuning.backend)
         self._grid = grid
         self._projection = Projection(grid)
         self._rows = Rows(self._machine, grid, self._period, tuning.box)
         self._cost = Cost(grid, self._rows.layout, tuning, self._period)
+        self._backend = make_solver(tuning.backend, grid, self._cost)
         slacks = self._rows.layout.slacks
         self._box = np.zeros(slacks), np.full(slacks, FREE)
 
@@ -96,7 +96,7 @@ class SixAxis:
             if (old.reference, old.predictor) != (tuning.reference, tuning.predictor):
                 reference = self._make_reference(tuning, self._grid.nodes)
             if old.backend != tuning.backend:
-                backend = make_backend(tuning.backend)
+                backend = make_solver(tuning.backend, self._grid, self._cost)
             self._reference, self._backend = reference, backend
             self._cost.weigh(tuning)
         self._tuning = tuning
@@ -126,7 +126,7 @@ class SixAxis:
             QpVectors(linear, lower, upper, *self._box), QpMatrices(hessian, self._rows.matrix)
         )
         solved = perf_counter()
-        if not self._usable(result):
+        if not result.usable:
             self._say(str(result.status), result.iterations)
             return None
         slacks = self._rows.layout.slacks
@@ -185,11 +185,6 @@ class SixAxis:
         # rest to the last bit: rounding leaves 1e-16 otherwise
         velocity[-1] = acceleration[-1] = 0.0
         return Candidate(grid.edges, frozen(pose), frozen(velocity), frozen(acceleration))
-
-    def _usable(self, result: QpResult) -> bool:
-        """An active set cut short is worthless; other methods' last iterates are plans as well."""
-        cut_short = result.status is QpStatus.BUDGET and self._tuning.backend != "daqp"
-        return (result.status is QpStatus.SOLVED or cut_short) and bool(np.isfinite(result.x).all())
 
     def _say(self, status: str, iterations: int) -> None:
         self._report = replace(self._report, solver_status=status, iterations=iterations)

@@ -51,6 +51,20 @@ class Cost:
         self._linear = np.zeros(layout.size)
         self.weigh(tuning)
 
+    @property
+    def factor(self) -> Array | None:
+        """Weighted derivatives F of the outputs by the coefficients after `fill`: F'F is in H.
+
+        (N nodes, outputs, 6 axes, K), each row of one instant alone; None where organs mix the
+        errors of several.
+        """
+        return None if self._perceived is not None else self._outputs
+
+    @property
+    def prices(self) -> Array:
+        """Of pose, velocity and acceleration at the nodes, per axis, (3, 6)."""
+        return self._prices
+
     def weigh(self, tuning: Tuning) -> None:
         """Take other weights.
 

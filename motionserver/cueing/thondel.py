@@ -28,7 +28,7 @@ from motionserver.cueing.thondel_plant import make_plant, stacked_state
 from motionserver.cueing.thondel_qp import Programme
 from motionserver.cueing.thondel_rows import LEG_UNIT
 from motionserver.cueing.tuning import Tuning
-from motionserver.solvers.base import QpResult, QpStatus
+from motionserver.solvers.base import QpResult
 from motionserver.solvers.registry import make_backend
 
 YAW_CORNER: Final = 0.5
@@ -160,7 +160,7 @@ class Thondel:
             parent.poses(takeover + self._programme.looks),
             self._halving.x_max,
         )
-        if not self._usable(result):
+        if not result.usable:
             self._say(str(result.status), result.iterations)
             return None
         inputs = result.x[: self._programme.layout.inputs]
@@ -176,11 +176,6 @@ class Thondel:
         slack = float(result.x[self._programme.layout.leg]) * LEG_UNIT
         self._pending = _Pending(pose[looks], inputs[:: self._plant.moves], start, slack)
         return Candidate(frozen(times), frozen(pose), frozen(velocity), frozen(acceleration))
-
-    def _usable(self, result: QpResult) -> bool:
-        """An active set cut short is worthless; other methods' last iterates are plans as well."""
-        cut_short = result.status is QpStatus.BUDGET and self._tuning.backend != "daqp"
-        return (result.status is QpStatus.SOLVED or cut_short) and bool(np.isfinite(result.x).all())
 
     def _say(self, status: str, iterations: int) -> None:
         self._report = replace(self._report, solver_status=status, iterations=iterations)

@@ -31,11 +31,15 @@ class QpResult:
         x: The minimiser, (n,); the last iterate after BUDGET, NaN where there is none.
         status: SOLVED; BUDGET (iterations used up); INFEASIBLE; FAILED (anything else).
         iterations: Iterations used.
+        usable: Whether ``x`` may be offered as a plan: finite, and solved or the iterate of a
+            method that is sound when cut short. Whether it keeps every limit is for the caller's
+            own check to say.
     """
 
     x: Array
     status: QpStatus
     iterations: int
+    usable: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +78,15 @@ class QpBackend(Protocol):
     """A solver for one programme whose size stays fixed.
 
     ``solve`` may be called for ever after; matrices handed over once stay in force until others
-    are. The last solution warm-starts the next one where the method allows it. Numbers never
-    raise: not finite, infeasible, ill-conditioned ones come back as a status.
+    are; the very same H handed over again is taken as unchanged. The last solution warm-starts the
+    next one where the method allows it. Numbers never raise: not finite, infeasible,
+    ill-conditioned ones come back as a status.
+
+    Every backend takes a fixed budget of iterations. What is left when it is used up differs: an
+    interior-point iterate (piqp, hpipm) lies inside the inequalities once a full step has been
+    made, so a few iterations short of the optimum it is a plan a little too timid; an iterate of
+    operator splitting (osqp) may break bounds by a few thousandths; an active set (daqp) short of
+    the optimum is no plan at all. `QpResult.usable` says so.
     """
 
     name: str
@@ -99,7 +110,7 @@ class QpBackend(Protocol):
 
 def no_solution(size: int, status: QpStatus = QpStatus.FAILED, iterations: int = 0) -> QpResult:
     """A result that says there is none."""
-    return QpResult(np.full(size, np.nan), status, iterations)
+    return QpResult(np.full(size, np.nan), status, iterations, usable=False)
 
 
 def finite(vectors: QpVectors, matrices: QpMatrices | None) -> bool:

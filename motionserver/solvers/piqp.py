@@ -2,75 +2,71 @@
 
 from __future__ import annotations
 
+from typing import ClassVar, Final
+
 import numpy as np
 import piqp
 
 from motionserver.core.axes import Array
-from motionserver.solvers.base import (
-    INFINITE,
-    QpMatrices,
-    QpResult,
-    QpStatus,
-    QpVectors,
-    checked_shapes,
-    finite,
-    no_solution,
-)
+from motionserver.solvers.base import QpMatrices, QpStatus
+from motionserver.solvers.dense import Bounds, DenseBackend, Outcome
+
+_ENDINGS: Final = {
+    piqp.PIQP_SOLVED: QpStatus.SOLVED,
+    piqp.PIQP_MAX_ITER_REACHED: QpStatus.BUDGET,
+    piqp.PIQP_PRIMAL_INFEASIBLE: QpStatus.INFEASIBLE,
+}
 
 
-class Piqp:
+class Piqp(DenseBackend):
     """PIQP's dense solver. It wants ``inf`` for absent bounds and a duality-gap tolerance."""
 
-    name = "piqp"
+    name: ClassVar[str] = "piqp"
+    no_bound: ClassVar[float] = np.inf
+    cut_short_usable: ClassVar[bool] = True
 
     def __init__(self, iterations: int = 60, tolerance: float = 1e-8) -> None:
+        super().__init__()
         self._iterations = iterations
         self._tolerance = tolerance
         self._solver: piqp.DenseSolver | None = None
-        self._shape: tuple[int, int, int] | None = None
-        self._matrices: QpMatrices | None = None
+        self._absent: np.ndarray = np.empty(0, dtype=bool)
 
-    def solve(self, vectors: QpVectors, matrices: QpMatrices | None = None) -> QpResult:
-        """Solve; see `QpBackend.solve`."""
-        self._shape = checked_shapes(vectors, matrices, self._shape)
-        n, m, b = self._shape
-        if not finite(vectors, matrices):
-            return no_solution(n)
-        if matrices is not None:
-            self._matrices = QpMatrices(
-                np.asfortranarray(matrices.H, dtype=np.float64),
-                np.asfortranarray(matrices.A, dtype=np.float64),
-            )
-        assert self._matrices is not None
-        box = np.full((2, n), np.inf)
-        box[0, :b], box[1, :b] = _bounded(vectors.box_lower), _bounded(vectors.box_upper)
-        box[0, b:] = -np.inf
-        lower, upper = _bounded(vectors.lower), _bounded(vectors.upper)
-        if (box[0] > box[1]).any() or (lower > upper).any():
-            return no_solution(n, QpStatus.INFEASIBLE)
-        rows = self._matrices.A if m else None
-        bounds = {"h_l": lower, "h_u": upper} if m else {}
+    def _keep(self, matrices: QpMatrices) -> QpMatrices:
+        return QpMatrices(
+            np.asfortranarray(matrices.H, dtype=np.float64),
+            np.asfortranarray(matrices.A, dtype=np.float64),
+        )
+
+    def _run(self, q: Array, bounds: Bounds, matrices: QpMatrices, fresh: bool) -> Outcome:
+        b = bounds.box
+        box_lower, box_upper = np.full(len(q), -np.inf), np.full(len(q), np.inf)
+        box_lower[:b], box_upper[:b] = bounds.lower[:b], bounds.upper[:b]
+        limits = {"x_l": box_lower, "x_u": box_upper}
+        table, lower, upper = matrices.A, bounds.lower[b:], bounds.upper[b:]
+        absent = np.isinf(lower) & np.isinf(upper)
+        if absent.any():
+            # it writes a complaint to the terminal about every row without a bound
+            table = np.where(absent[:, None], 0.0, table)
+            lower, upper = np.where(absent, -1.0, lower), np.where(absent, 1.0, upper)
+        fresh = fresh or not np.array_equal(absent, self._absent)
+        self._absent = absent
+        if len(lower):
+            limits |= {"h_l": lower, "h_u": upper}
+        rows = table if len(lower) else None
         if self._solver is None:
             self._solver = self._fresh()
-            self._solver.setup(
-                self._matrices.H, vectors.q, G=rows, x_l=box[0], x_u=box[1], **bounds
-            )
-        elif matrices is not None:
-            self._solver.update(
-                P=self._matrices.H, c=vectors.q, G=rows, x_l=box[0], x_u=box[1], **bounds
-            )
+            self._solver.setup(matrices.H, q, G=rows, **limits)
+        elif fresh:
+            self._solver.update(P=matrices.H, c=q, G=rows, **limits)
         else:
-            self._solver.update(c=vectors.q, x_l=box[0], x_u=box[1], **bounds)
-        status = self._solver.solve()
-        iterations = int(self._solver.result.info.iter)
-        x = np.array(self._solver.result.x, dtype=np.float64)
-        if status == piqp.PIQP_SOLVED and np.isfinite(x).all():
-            return QpResult(x, QpStatus.SOLVED, iterations)
-        if status == piqp.PIQP_MAX_ITER_REACHED and np.isfinite(x).all():
-            return QpResult(x, QpStatus.BUDGET, iterations)
+            self._solver.update(c=q, **limits)
+        status = _ENDINGS.get(self._solver.solve(), QpStatus.FAILED)
+        found = self._solver.result
+        return Outcome(np.array(found.x, dtype=np.float64), status, int(found.info.iter))
+
+    def _forget(self) -> None:
         self._solver = None
-        infeasible = status == piqp.PIQP_PRIMAL_INFEASIBLE
-        return no_solution(n, QpStatus.INFEASIBLE if infeasible else QpStatus.FAILED, iterations)
 
     def _fresh(self) -> piqp.DenseSolver:
         solver = piqp.DenseSolver()
@@ -81,7 +77,3 @@ class Piqp:
         settings.max_iter = self._iterations
         settings.verbose = False
         return solver
-
-
-def _bounded(bounds: Array) -> Array:
-    return np.where(np.abs(bounds) >= INFINITE, np.copysign(np.inf, bounds), bounds)

@@ -3,38 +3,96 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Final
+from typing import Any, Final
 
 from motionserver.solvers.base import QpBackend
+from motionserver.solvers.stage import StageBackend
 
 BACKENDS: Final = {
     "daqp": ("motionserver.solvers.daqp", "Daqp"),
     "osqp": ("motionserver.solvers.osqp", "Osqp"),
     "piqp": ("motionserver.solvers.piqp", "Piqp"),
+    "hpipm": ("motionserver.solvers.hpipm", "Hpipm"),
 }
 """Module and class of every backend; imported when first asked for."""
 
+REFERENCE: Final = "reference"
+"""Name of a backend that may take its time and errs by 1e-9: for benchmarks and tests."""
 
-def make_backend(name: str) -> QpBackend:
+STAGED: Final = {"hpipm": ("motionserver.solvers.hpipm", "HpipmStages")}
+"""Module and class of those that also solve programmes by stages."""
+
+OPTIONAL: Final = frozenset({"hpipm"})
+"""Backends whose library is an extra of the package."""
+
+
+def present(name: str) -> bool:
+    """Whether a backend of `BACKENDS` can be made here."""
+    try:
+        make_backend(name)
+    except ValueError:
+        return False
+    return True
+
+
+def make_backend(name: str, iterations: int | None = None) -> QpBackend:
     """Make a fresh backend.
 
     Args:
-        name: One of `BACKENDS`.
+        name: One of `BACKENDS`, or `REFERENCE`.
+        iterations: Fixed budget of iterations; None is the backend's own. See `QpBackend` for what
+            a result is worth when it is used up.
 
     Raises:
-        ValueError: There is no such backend, or its library cannot be imported.
+        ValueError: There is no such backend, its library cannot be imported, or the budget is not
+            positive.
     """
+    if name == REFERENCE:
+        # not among the backends: nobody shall drive with it
+        return _make("piqp", {"iterations": iterations or 200, "tolerance": 1e-9})
     if name not in BACKENDS:
         raise ValueError(
             f"QP backend {name!r} does not exist; allowed: {', '.join(BACKENDS)}; "
             "change tuning.backend"
         )
-    module, cls = BACKENDS[name]
-    try:
-        backend: QpBackend = getattr(import_module(module), cls)()
-    except ImportError as error:
+    if iterations is not None and iterations < 1:
         raise ValueError(
-            f"QP backend {name!r} cannot be imported ({error}); install the library "
-            f"{name!r} or choose another of {', '.join(BACKENDS)}"
-        ) from error
+            f"QP backend {name!r}: a budget of {iterations} iterations finds nothing; allowed is "
+            "1 or more, or None for the backend's own"
+        )
+    return _make(name, {} if iterations is None else {"iterations": iterations})
+
+
+def make_stage_backend(name: str, iterations: int | None = None) -> StageBackend:
+    """Make a fresh solver of stage programmes.
+
+    Args:
+        name: One of `STAGED`.
+        iterations: Fixed budget of iterations; None is the backend's own.
+
+    Raises:
+        ValueError: There is no such backend, or its library cannot be imported.
+    """
+    if name not in STAGED:
+        raise ValueError(f"stage backend {name!r} does not exist; allowed: {', '.join(STAGED)}")
+    options = {} if iterations is None else {"iterations": iterations}
+    backend: StageBackend = _made(name, STAGED[name], options)
     return backend
+
+
+def _make(name: str, options: dict[str, Any]) -> QpBackend:
+    backend: QpBackend = _made(name, BACKENDS[name], options)
+    return backend
+
+
+def _made(name: str, where: tuple[str, str], options: dict[str, Any]) -> Any:  # noqa: ANN401
+    module, cls = where
+    try:
+        return getattr(import_module(module), cls)(**options)
+    except ImportError as error:
+        what = f"motionserver[{name}]" if name in OPTIONAL else name
+        others = ", ".join(other for other in BACKENDS if other not in OPTIONAL)
+        raise ValueError(
+            f"QP backend {name!r} cannot be loaded ({error}); pip install '{what}', or change "
+            f"tuning.backend to one of {others}"
+        ) from error

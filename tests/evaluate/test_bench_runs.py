@@ -5,12 +5,23 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from motionserver.evaluate.bench import command
 from motionserver.evaluate.bench.latency import ages, bench_latency, first_changes, loopback_floor
 from motionserver.evaluate.bench.loop import bench_loop
-from motionserver.evaluate.bench.plan import DEFAULT, headline, plan_cases
-from motionserver.evaluate.bench.plan_steps import PERIOD, time_plans
+from motionserver.evaluate.bench.plan import (
+    DEFAULT,
+    PlanBench,
+    bench_plan,
+    headline,
+    measure_plan,
+    plan_cases,
+)
+from motionserver.evaluate.bench.plan_accuracy import accuracy_text, measure_accuracy
+from motionserver.evaluate.bench.plan_growth import exponent_of, growth_text, measure_growth
+from motionserver.evaluate.bench.plan_steps import LIVELY, time_plans
 from motionserver.evaluate.bench.processes import BenchError, Helper
 from motionserver.evaluate.bench.report import row_of_samples
 from motionserver.evaluate.bench.sentinel import Sentinel
@@ -58,17 +69,72 @@ def test_latency_of_a_real_server():
 def test_every_case_of_the_plan_benchmark_runs():
     machine = load_machine("t2-compact")
     for name, tuning in plan_cases().items():
-        times = time_plans(machine, tuning, 5 * PERIOD)
+        times = time_plans(machine, tuning, 5, paced=False)
         rows = times.rows(name)
         assert len(times.period) == 5
         assert_sound(rows[0])
         assert times.outcomes["rejected by guard"] == 0
+        assert times.outcomes["no plan"] == 0, name
+        assert np.isfinite(times.force_rmse())
+
+
+def test_where_an_algorithm_tells_its_parts_they_are_rows():
+    rows = measure_plan("mpc daqp", 4)["rows"]
+    assert {"    linearise", "    fill", "    solve"} <= {row["name"] for row in rows}
+
+
+def test_the_drive_is_the_same_whether_paced_or_not():
+    machine, tuning = load_machine("t2-compact"), plan_cases()["classical"]
+    drives = [time_plans(machine, tuning, 8, paced, begin=LIVELY) for paced in (True, False)]
+    np.testing.assert_array_equal(drives[0].error, drives[1].error)
+
+
+def test_kernel_and_sentinel_stand_beside_each_case():
+    rows = bench_plan(PlanBench(40, paced=False, only="classical"))
+    names = [row.name for row in rows]
+    assert names[0] == "classical"
+    assert {"  kernel beside it", "  sentinel beside it", "sentinel 100 Hz"} <= set(names)
+    for row in rows:
+        assert_sound(row)
+
+
+def test_a_case_that_does_not_exist_is_named():
+    with pytest.raises(BenchError, match=r"'quadratic'.*mpc daqp"):
+        bench_plan(PlanBench(5, only="quadratic"))
+
+
+@given(st.floats(0.3, 4.0), st.floats(0.01, 10.0))
+def test_a_power_law_is_found(power, factor):
+    sizes = (10, 13, 15, 20, 25)
+    times = [factor * size**power for size in sizes]
+    assert exponent_of(sizes, times) == pytest.approx(power, rel=1e-6)
+    assert math.isnan(exponent_of(sizes[:1], times[:1]))
+
+
+def test_growth_is_measured_and_told():
+    found = measure_growth("daqp", 5)
+    assert len(found["propose_ms"]) == len(found["solve_ms"]) == len(found["pieces"])
+    assert math.isfinite(found["exponent"])
+    assert "mpc daqp" in growth_text([found])
+    json.dumps(found, allow_nan=False)
+
+
+def test_exact_backends_drive_like_the_optimum():
+    found = measure_accuracy(25, ("piqp", "daqp"))
+    piqp, daqp, best = found
+    assert best["backend"] == "reference"
+    assert piqp["within_bar"]
+    assert piqp["first_move_max"] < 1e-3
+    assert daqp["first_move_p50"] < 1e-2
+    assert "reference" in accuracy_text(found)
+    json.dumps(found, allow_nan=False)
 
 
 def test_the_headline_speaks_of_the_default():
     assert DEFAULT in plan_cases()
     line = headline([row_of_samples(DEFAULT, [2 * MS])])
-    assert line == "default with leg rows: p99.9 2.00 ms, half a period is 5 ms"
+    assert line == f"default ({DEFAULT}): p99.9 2.00 ms, half a period is 5 ms"
+    assert headline([]) == ""
 
 
 def test_loopback_alone():
@@ -108,14 +174,24 @@ def test_the_age_is_that_of_the_newest_cue_that_could_be_in_it():
 
 def test_the_command_writes_what_it_prints(tmp_path, capsys, monkeypatch):
     rows = [row_of_samples(DEFAULT, [2 * MS, 3 * MS])]
-    monkeypatch.setattr(command, "_MEASURES", {"plan": lambda seconds: rows})
-    assert command.run_bench("all", 1.0, tmp_path / "out.json") == 0
-    out = json.loads((tmp_path / "out.json").read_text())
-    assert out["plan"][0]["max_ms"] == 3.0
-    assert out["machine"]["cores"] >= 1
+    asked = []
+    monkeypatch.setattr(command, "bench_plan", lambda what: asked.append(what) or rows)
+    monkeypatch.setattr(command, "bench_growth", lambda ticks, backends: [])
+    monkeypatch.setattr(command, "bench_accuracy", lambda ticks, backends: [])
+    out = tmp_path / "out.json"
+    assert command.run_bench("plan", 1.0, out, ticks=7, paced=False) == 0
+    assert asked == [PlanBench(7, paced=False)]
+    found = json.loads(out.read_text())
+    assert found["plan"][0]["max_ms"] == 3.0
+    assert found["ticks"] == 7
+    assert found["plan_growth"] == found["plan_accuracy"] == []
+    assert found["machine"]["cores"] >= 1
     assert "half a period" in capsys.readouterr().out
+    assert command.run_bench("plan", 0.5, None, only="classical") == 0
+    assert asked[-1] == PlanBench(50, only="classical")
 
 
-def test_the_command_refuses_what_it_does_not_know():
+@pytest.mark.parametrize(("what", "seconds", "ticks"), [("everything", 1.0, 5), ("plan", 1.0, 0)])
+def test_the_command_refuses_what_it_cannot_do(what, seconds, ticks):
     with pytest.raises(ValueError, match="allowed are loop, plan, latency or all"):
-        command.run_bench("everything", 1.0, None)
+        command.run_bench(what, seconds, None, ticks)

@@ -1,10 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from motionserver.solvers import hpipm_library
 from motionserver.solvers.base import QpMatrices, QpStatus, QpVectors
-from motionserver.solvers.registry import BACKENDS, make_backend
+from motionserver.solvers.registry import BACKENDS, make_backend, present
+
+needs_hpipm = pytest.mark.skipif(not present("hpipm"), reason="needs the extra hpipm")
 
 
 def programme(seed, n=12, m=20, b=8):
@@ -47,6 +52,7 @@ class BackendContract:
 
     name: str
     accuracy = 1e-4
+    sound_when_cut_short = True
 
     @pytest.fixture
     def backend(self):
@@ -148,18 +154,62 @@ class BackendContract:
             backend.solve(*programme(3, n=13))
 
     def test_budget(self):
-        cls = type(make_backend(self.name))
         vectors, matrices = programme(5)
-        result = cls(iterations=1).solve(vectors, matrices)
+        backend = make_backend(self.name, iterations=1)
+        result = backend.solve(vectors, matrices)
         assert result.status in (QpStatus.BUDGET, QpStatus.FAILED)
+        assert result.iterations <= 1
+        assert result.usable == (self.sound_when_cut_short and result.status is QpStatus.BUDGET)
+        assert not result.usable or np.isfinite(result.x).all()
+
+    def test_solved_is_usable_and_nothing_else_without_a_budget(self, backend):
+        vectors, matrices = programme(4)
+        assert backend.solve(vectors, matrices).usable
+        poisoned = replace(vectors, q=np.full_like(vectors.q, np.nan))
+        assert not backend.solve(poisoned).usable
+
+    def test_rows_without_bounds_say_nothing_at_all(self, backend, capfd):
+        vectors, matrices = programme(6)
+        every = np.arange(len(vectors.upper))
+        for kept in (every % 2 == 0, every % 3 == 0, every < 0, every >= 0):
+            some = replace(vectors, upper=np.where(kept, vectors.upper, np.inf))
+            left = QpMatrices(matrices.H, matrices.A[kept])
+            only = replace(vectors, lower=vectors.lower[kept], upper=vectors.upper[kept])
+            wanted = make_backend(self.name).solve(only, left).x
+            for handed in (matrices, None):
+                found = backend.solve(some, handed)
+                assert found.x == pytest.approx(wanted, abs=20 * self.accuracy)
+            backend.solve(vectors, None)
+        assert capfd.readouterr() == ("", "")
+
+    def test_bounds_that_cross_are_infeasible(self, backend):
+        vectors, matrices = programme(4)
+        crossed = replace(vectors, lower=vectors.upper + 1.0)
+        result = backend.solve(crossed, matrices)
+        assert result.status is QpStatus.INFEASIBLE
+        assert not result.usable
+        assert backend.solve(vectors).status is QpStatus.SOLVED
+
+    def test_matrices_that_were_not_finite_were_not_taken(self, backend):
+        vectors, matrices = programme(4)
+        bad = QpMatrices(matrices.H, np.full_like(matrices.A, np.nan))
+        assert backend.solve(vectors, bad).status is QpStatus.FAILED
+        assert backend.solve(vectors).status is QpStatus.FAILED
+        assert backend.solve(vectors, matrices).status is QpStatus.SOLVED
 
 
 class TestDaqp(BackendContract):
     name = "daqp"
+    sound_when_cut_short = False
 
 
 class TestPiqp(BackendContract):
     name = "piqp"
+
+
+@needs_hpipm
+class TestHpipm(BackendContract):
+    name = "hpipm"
 
 
 class TestOsqp(BackendContract):
@@ -178,9 +228,28 @@ def test_exact_backends_agree_and_are_optimal(seed):
 
 
 def test_unknown_backend_names_the_known_ones():
-    with pytest.raises(ValueError, match="daqp, osqp, piqp"):
+    with pytest.raises(ValueError, match="daqp, osqp, piqp, hpipm"):
         make_backend("gurobi")
 
 
+def test_a_missing_library_says_what_to_install(monkeypatch):
+    monkeypatch.setattr(hpipm_library, "SHIPPED_BY", "no_such_package")
+    hpipm_library.library.cache_clear()
+    try:
+        with pytest.raises(
+            ValueError, match=r"no_such_package.*pip install 'motionserver\[hpipm\]'"
+        ):
+            make_backend("hpipm")
+        assert not present("hpipm")
+    finally:
+        hpipm_library.library.cache_clear()
+
+
+def test_a_budget_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="1 or more"):
+        make_backend("piqp", iterations=0)
+
+
 def test_registry_is_complete():
-    assert {make_backend(name).name for name in BACKENDS} == set(BACKENDS)
+    there = [name for name in BACKENDS if present(name)]
+    assert {make_backend(name).name for name in there} == set(there) >= {"daqp", "osqp", "piqp"}

@@ -4,49 +4,74 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from motionserver.evaluate.bench.latency import bench_latency
 from motionserver.evaluate.bench.loop import bench_loop
-from motionserver.evaluate.bench.plan import bench_plan, headline
-from motionserver.evaluate.bench.report import describe_machine, machine_text, table_text
+from motionserver.evaluate.bench.plan import PlanBench, backends, bench_plan, headline
+from motionserver.evaluate.bench.plan_accuracy import accuracy_text, bench_accuracy
+from motionserver.evaluate.bench.plan_growth import bench_growth, growth_text
+from motionserver.evaluate.bench.plan_steps import PERIOD
+from motionserver.evaluate.bench.report import Row, describe_machine, machine_text, table_text
 
-_TITLES = {"loop": "lateness of ticks", "plan": "plan times", "latency": "latency"}
-_MEASURES = {"loop": bench_loop, "plan": bench_plan, "latency": bench_latency}
+WHATS: Final = ("loop", "plan", "latency")
+_MOST: Final = 3600.0
 
 
-def run_bench(what: str, seconds: float, json_out: Path | None) -> int:
+def run_bench(
+    what: str,
+    seconds: float,
+    json_out: Path | None,
+    ticks: int | None = None,
+    paced: bool = True,
+    only: str = "",
+) -> int:
     """Measure and print; every figure stands beside a sentinel of the same run.
 
     Args:
         what: "loop", "plan", "latency" or "all".
         seconds: Length of each stretch [s].
         json_out: File for all figures.
+        ticks: Periods per case of "plan" instead of ``seconds``.
+        paced: Whether those wait for their time, as live.
+        only: Word that a case's name of "plan" must contain; growth and accuracy are of "mpc".
 
     Returns:
         Exit status, 0: figures are told, not judged.
 
     Raises:
         BenchError: A benchmark could not be carried out.
-        ValueError: ``what`` is none of these, or ``seconds`` is not positive.
+        ValueError: ``what`` is none of these, or the length is not positive.
     """
-    if what not in (*_MEASURES, "all") or not 0.0 < seconds <= 3600.0:
+    count = round(seconds / PERIOD) if ticks is None else ticks
+    if what not in (*WHATS, "all") or not 0.0 < seconds <= _MOST or not 0 < count * PERIOD <= _MOST:
         raise ValueError(
-            f"bench: {what!r} for {seconds:g} s is not possible; "
-            f"allowed are {', '.join(_MEASURES)} or all, for up to 3600 s"
+            f"bench: {what!r} for {seconds:g} s or {count} ticks is not possible; "
+            f"allowed are {', '.join(WHATS)} or all, for up to {_MOST:g} s"
         )
     machine = describe_machine()
     _tell(machine_text(machine))
     out: dict[str, Any] = {"machine": machine, "seconds": seconds}
-    for name, measure in _MEASURES.items():
-        if what not in (name, "all"):
-            continue
-        rows = measure(seconds)
-        _tell("", table_text(_TITLES[name], rows))
+    measures: dict[str, Callable[[], list[Row]]] = {
+        "loop": lambda: bench_loop(seconds),
+        "plan": lambda: bench_plan(PlanBench(count, paced, only)),
+        "latency": lambda: bench_latency(seconds),
+    }
+    titles = {"loop": "lateness of ticks", "plan": "plan times", "latency": "latency"}
+    for name in WHATS if what == "all" else (what,):
+        rows = measures[name]()
+        _tell("", table_text(titles[name], rows))
         out[name] = [row.to_mapping() for row in rows]
         if name == "plan":
-            _tell(headline(rows))
+            _tell(*filter(None, [headline(rows)]))
+            out |= {"ticks": count, "paced": paced}
+    if what in ("plan", "all") and only in "mpc":
+        out["plan_growth"] = bench_growth(count, backends())
+        _tell("", growth_text(out["plan_growth"]))
+        out["plan_accuracy"] = bench_accuracy(count, backends())
+        _tell("", accuracy_text(out["plan_accuracy"]))
     if json_out is not None:
         json_out.write_text(json.dumps(out, indent=2) + "\n", encoding="utf-8")
     return 0

@@ -1,75 +1,116 @@
 """How long a plan takes: algorithms and backends in lock-step over a shipped recording.
 
-Run as ``python -m motionserver.evaluate.bench.plan CASE SECONDS``: a process of its own, so that
-BLAS has one thread and nothing else is loaded; with the planner's scheduling, and paced like it, so
-that caches are as cold as live. The clock of the drive is a manual one: a late step changes no
-plan.
+Run as ``python -m motionserver.evaluate.bench.plan CASE TICKS PACED``: a process of its own, so
+that BLAS has one thread and nothing else is loaded; with the planner's scheduling. The clock of the
+drive is a manual one: a late step changes no plan.
 """
 
 from __future__ import annotations
 
-import gc
 import sys
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from motionserver.cueing.reference import MODELS
+from motionserver.cueing.registry import algorithms
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.bench.plan_steps import KERNEL_SIZE, PERIOD, time_plans
-from motionserver.evaluate.bench.processes import Helper, say
+from motionserver.evaluate.bench.processes import BenchError, Helper, say
+from motionserver.evaluate.bench.quiet import quiet
 from motionserver.evaluate.bench.report import Row, row_of_histogram, row_of_samples
 from motionserver.evaluate.bench.sentinel import Sentinel
 from motionserver.settings.machine import load_machine
-from motionserver.solvers.registry import BACKENDS
+from motionserver.solvers.registry import BACKENDS, present
 from motionserver.telemetry.histogram import Histogram
-from motionserver.telemetry.realtime import take_priority
 
 PRIORITY: Final = 30
 """The planner's."""
-DEFAULT: Final = "thondel2014 legs daqp"
+DEFAULT: Final = f"{Tuning().algorithm} {'legs ' if Tuning().algorithm != 'mpc' else ''}daqp"
+UNPACED_SHARE: Final = 0.25
+"""Of the drive's length for which a sentinel sleeps beside periods that wait for nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanBench:
+    """What to measure.
+
+    Attributes:
+        ticks: Periods of the drive, per case.
+        paced: Wait for each period to begin, as live; else as fast as it goes.
+        only: Word that a case's name must contain.
+    """
+
+    ticks: int
+    paced: bool = True
+    only: str = ""
+
+
+def backends() -> tuple[str, ...]:
+    """Those whose library is there."""
+    return tuple(name for name in BACKENDS if present(name))
 
 
 def plan_cases() -> dict[str, Tuning]:
-    """What is measured: both algorithms, the MPC with and without leg rows on every backend."""
+    """What is measured: every algorithm of ours on every backend that is there."""
     base = Tuning()
-    cases = {
+    cases: dict[str, Tuning] = {}
+    if "mpc" in algorithms():
+        cases = {
+            f"mpc {backend}": replace(base, algorithm="mpc", backend=backend)
+            for backend in backends()
+        }
+        cases |= {
+            f"mpc {reference} daqp": replace(base, algorithm="mpc", reference=reference)
+            for reference in MODELS
+            if reference != base.reference
+        }
+    cases |= {
         f"thondel2014 {'legs' if legs else 'box'} {backend}": replace(
             base, algorithm="thondel2014", legs=legs, backend=backend
         )
         for legs in (True, False)
-        for backend in BACKENDS
+        for backend in backends()
     }
     return {**cases, "classical": replace(base, algorithm="classical")}
 
 
-def measure_plan(name: str, seconds: float) -> dict[str, Any]:
+def measure_plan(name: str, ticks: int, paced: bool = True) -> dict[str, Any]:
     """One case in this process: its rows as mappings, its kernel's times, its scheduling."""
-    scheduling = take_priority(PRIORITY, True)
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    times = time_plans(load_machine("t2-compact"), plan_cases()[name], seconds)
+    with quiet(PRIORITY) as scheduling:
+        times = time_plans(load_machine("t2-compact"), plan_cases()[name], ticks, paced)
     rows = [row.to_mapping() for row in times.rows(name)]
     return {"rows": rows, "kernel": times.kernel, "scheduling": scheduling}
 
 
-def bench_plan(seconds: float) -> list[Row]:
+def bench_plan(what: PlanBench) -> list[Row]:
     """Measure plan times, each case in a process of its own beside a sentinel.
 
-    Args:
-        seconds: Of the drive, per case [s]; a case that cannot keep up takes longer.
+    Raises:
+        BenchError: No case has such a name.
     """
+    names = [name for name in plan_cases() if what.only in name]
+    if not names:
+        raise BenchError(
+            f"bench plan: no case is called {what.only!r}; allowed is a part of one of: "
+            + ", ".join(plan_cases())
+        )
     rows: list[Row] = []
     kernels: list[int] = []
     asleep = Histogram()
     scheduling = ""
-    for name in plan_cases():
+    beside = what.ticks * PERIOD * (1.0 if what.paced else UNPACED_SHARE)
+    for name in names:
+        arguments = (name, str(what.ticks), str(int(what.paced)))
         with (
-            Helper("motionserver.evaluate.bench.plan", name, str(seconds)) as plans,
-            Sentinel(PERIOD, seconds, PRIORITY) as sentinel,
+            Helper("motionserver.evaluate.bench.plan", *arguments) as plans,
+            Sentinel(PERIOD, beside, PRIORITY) as sentinel,
         ):
             found = plans.result()
             late = sentinel.late()
         rows += [Row(**row) for row in found["rows"]]
+        rows.append(row_of_samples("  kernel beside it", found["kernel"]))
+        rows.append(row_of_histogram("  sentinel beside it", late))
         kernels += found["kernel"]
         asleep, scheduling = asleep.plus(late), found["scheduling"]
     rows.append(row_of_samples(f"kernel: {KERNEL_SIZE} x {KERNEL_SIZE} product", kernels))
@@ -77,11 +118,13 @@ def bench_plan(seconds: float) -> list[Row]:
     return rows
 
 
-def headline(rows: list[Row]) -> str:
-    """The one line that says whether the default fits."""
-    default = next(row for row in rows if row.name == DEFAULT)
-    return f"default with leg rows: p99.9 {default.p999_ms:.2f} ms, half a period is 5 ms"
+def headline(rows: Sequence[Row]) -> str:
+    """The one line that says whether the default fits; empty if it was not measured."""
+    default = next((row for row in rows if row.name == DEFAULT), None)
+    if default is None:
+        return ""
+    return f"default ({DEFAULT}): p99.9 {default.p999_ms:.2f} ms, half a period is 5 ms"
 
 
 if __name__ == "__main__":
-    say(measure_plan(sys.argv[1], float(sys.argv[2])))
+    say(measure_plan(sys.argv[1], int(sys.argv[2]), sys.argv[3] == "1"))

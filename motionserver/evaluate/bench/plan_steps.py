@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,16 +12,17 @@ from typing import Final
 import numpy as np
 from motion_clients.recording import RecordedSample, read_recording, recording_path
 
-from motionserver.core.axes import Array, frozen
+from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.intake.intake import Head, Intake
-from motionserver.core.kinematics.rotation import gravity_in_body
+from motionserver.core.kinematics.rotation import felt, gravity_in_body
 from motionserver.core.limits import Machine
-from motionserver.core.motion.player import Playback, advance, follow
+from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.plan import Plan, pack
 from motionserver.core.safety.accept import accept_proposal, accept_rest
 from motionserver.core.safety.verdict import Rejection
 from motionserver.core.state import PlatformState, Stimulus, VehicleMotion
 from motionserver.cueing.base import Candidate, Cueing, Report
+from motionserver.cueing.registry import Maker, make_cueing
 from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.bench.processes import BenchError
@@ -28,8 +30,12 @@ from motionserver.evaluate.bench.report import Row, row_of_samples
 
 PERIOD: Final = 0.01
 RECORDING: Final = "truck_lanechange_slalom"
+LIVELY: Final = 2200
+"""Sample of it from which on it is never dull for twenty seconds, for short stretches."""
 KERNEL_SIZE: Final = 96
 """Rows of the square matrices whose product is the yardstick."""
+TIMED: Final = "t_"
+"""Numbers of an algorithm's report that begin so are durations [s]."""
 _KERNEL_EVERY: Final = 5
 
 
@@ -74,7 +80,11 @@ class Clocked:
 
 @dataclass(slots=True)
 class Times:
-    """What one case took, per period [ns], and what became of its plans."""
+    """What one case took, per period [ns], and what became of its plans.
+
+    ``parts`` are those of `propose` that the algorithm itself tells; ``error`` is felt minus
+    wanted specific force at each hand-over, (3,) [m/s2].
+    """
 
     period: list[int] = field(default_factory=list)
     cpu: list[int] = field(default_factory=list)
@@ -83,6 +93,8 @@ class Times:
     verify: list[int] = field(default_factory=list)
     kernel: list[int] = field(default_factory=list)
     iterations: list[int] = field(default_factory=list)
+    parts: dict[str, list[int]] = field(default_factory=dict)
+    error: list[Array] = field(default_factory=list)
     outcomes: Counter[str] = field(default_factory=Counter)
 
     def rows(self, name: str) -> list[Row]:
@@ -104,34 +116,58 @@ class Times:
             row_of_samples(name, self.period, **notes),
             row_of_samples("  CPU time of it", self.cpu),
             row_of_samples("  propose", self.propose),
+            *(row_of_samples(f"    {part}", times) for part, times in self.parts.items()),
             row_of_samples("  govern", self.govern),
             row_of_samples("  guard's check", self.verify),
         ]
 
+    def force_rmse(self) -> float:
+        """Root of the mean squared error of the felt specific force [m/s2]."""
+        return float(np.sqrt(np.mean(np.sum(np.square(self.error), axis=1))))
 
-def time_plans(machine: Machine, tuning: Tuning, seconds: float) -> Times:
-    """Drive for ``seconds`` [s] of the recording at 100 Hz and time every planner period.
+
+def time_plans(
+    machine: Machine,
+    tuning: Tuning,
+    ticks: int,
+    paced: bool = True,
+    make: Maker = make_cueing,
+    begin: int = 0,
+) -> Times:
+    """Drive for ``ticks`` periods of the recording at 100 Hz and time every one.
 
     Each period takes the packet in, proposes, governs with the planner's check and packs; the
     guard's acceptance is timed beside it. Plans take over one period later, as live.
+
+    Args:
+        machine: Geometry and limits.
+        tuning: Algorithm, backend and the rest.
+        ticks: How many periods.
+        paced: Wait for each period to begin, so that caches are as cold as live; else as fast as
+            it goes.
+        make: Makes the algorithm.
+        begin: Sample of the recording it begins with.
+
+    Raises:
+        BenchError: The machine cannot stand at neutral.
     """
     homes = np.stack((np.zeros(6), machine.parked_pose))
     rest = accept_rest(machine, np.zeros(6), 0, homes)
     if isinstance(rest, Rejection):
         raise BenchError(f"bench plan: {machine.name} cannot stand at neutral ({rest})")
     thinker = Thinker(machine, tuning, PERIOD, homes)
+    thinker.cueing = clocked = Clocked(make(machine, tuning, PERIOD))
     intake, head = Intake(), Head(np.zeros(3), tuning.scale)
     playback, out = Playback(rest), Times()
     left = right = np.random.default_rng(0).standard_normal((KERNEL_SIZE, KERNEL_SIZE))
-    clocked: Clocked = Clocked(thinker.cueing)
     due = monotonic()
-    for number, motion in zip(range(1, int(seconds / PERIOD) + 1), _motions(), strict=False):
+    for number, motion in zip(range(1, ticks + 1), _motions(begin), strict=False):
         if thinker.cueing is not clocked:
-            # at the start, and after it raised: the thinker makes a fresh one then
-            clocked = Clocked(thinker.cueing)
-            thinker.cueing = clocked
+            # it raised: the thinker makes a fresh one then
+            thinker.cueing = clocked = Clocked(thinker.cueing)
         due += PERIOD
-        sleep(max(0.0, due - monotonic()))
+        if paced:
+            sleep(max(0.0, due - monotonic()))
         parent = playback.newest
         takeover = playback.newest_clock + PERIOD
         began, began_cpu = perf_counter_ns(), thread_time_ns()
@@ -147,6 +183,9 @@ def time_plans(machine: Machine, tuning: Tuning, seconds: float) -> Times:
         out.propose.append(clocked.propose_ns)
         out.govern.append(thought_ns - clocked.propose_ns)
         out.iterations.append(thought.report.iterations)
+        for part in (name for name in thought.report.numbers if name.startswith(TIMED)):
+            taken = round(thought.report.numbers[part] * 1e9)
+            out.parts.setdefault(part.removeprefix(TIMED), []).append(taken)
         if thought.proposal is None:
             out.outcomes["no plan"] += 1
         else:
@@ -162,6 +201,9 @@ def time_plans(machine: Machine, tuning: Tuning, seconds: float) -> Times:
             else:
                 playback = follow(playback, verdict)
         playback = advance(playback, PERIOD)
+        state = state_now(playback)
+        force, _ = felt(state.pose, state.velocity, state.acceleration, machine.head)
+        out.error.append(force - np.array([0.0, 0.0, GRAVITY]) - stimulus.force)
         if number % _KERNEL_EVERY == 0:
             began = perf_counter_ns()
             left = left @ right / KERNEL_SIZE
@@ -169,17 +211,15 @@ def time_plans(machine: Machine, tuning: Tuning, seconds: float) -> Times:
     return out
 
 
-def _motions() -> Iterator[VehicleMotion]:
+def _motions(begin: int) -> Iterator[VehicleMotion]:
     """The recording at 100 Hz, forwards and backwards in turn: no jump where it begins anew."""
     samples = read_recording(recording_path(RECORDING)).samples
-    number = 0
-    while True:
-        for sample in samples if (number // len(samples)) % 2 == 0 else reversed(samples):
-            stamp = round(number * PERIOD * 1e9)
-            force = frozen(np.asarray(sample.acceleration) + _gravity(sample))
-            rates = frozen(sample.rates)
-            yield VehicleMotion(stamp, 1, number, stamp, force, rates, sample.speed)
-            number += 1
+    there_and_back = itertools.cycle((*samples, *reversed(samples)))
+    for number, sample in enumerate(itertools.islice(there_and_back, begin, None)):
+        stamp = round(number * PERIOD * 1e9)
+        force = frozen(np.asarray(sample.acceleration) + _gravity(sample))
+        rates = frozen(sample.rates)
+        yield VehicleMotion(stamp, 1, number, stamp, force, rates, sample.speed)
 
 
 def _gravity(sample: RecordedSample) -> Array:
