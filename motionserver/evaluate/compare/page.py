@@ -141,8 +141,11 @@ def _cards(found: Sequence[Block]) -> str:
     broken = sum(line.values[column["broken"]] or 0.0 for line in mean.lines)
     cards = [(f"{broken:.0f}", "samples beyond a limit", "good" if broken == 0 else "poor")]
     for line in mean.lines:
-        ratio, nrmse = line.values[column[RATIO]], line.values[0]
-        if _colour(line.label, mean) == 0 or ratio is None or nrmse is None:
+        ratio = line.values[column[RATIO]]
+        # all ways are in the bars below; here the first of each and the main upper bound
+        bound = _way(line.label, mean) == "hollow" and _colour(line.label, mean) == 1
+        plain = _way(line.label, mean) == "" and not _is_rival(line.label)
+        if not (plain or bound) or ratio is None:
             continue
         kind = "good" if ratio < 1.0 else ""
         cards.append((f"{ratio:.2f}", f"{line.label}: error over hindsight, mean", kind))
