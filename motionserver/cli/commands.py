@@ -136,8 +136,8 @@ def demo(
     ] = None,
     no_page: Annotated[bool, typer.Option("--no-page", help="without the page")] = False,
     algorithm: Annotated[
-        str, typer.Option("--algorithm", help="classical or thondel2014", metavar="NAME")
-    ] = "thondel2014",
+        str, typer.Option("--algorithm", help="mpc, thondel2014 or classical", metavar="NAME")
+    ] = "mpc",
     fault: Annotated[
         str,
         typer.Option(
@@ -206,7 +206,7 @@ def evaluate(
     recording: Annotated[Path | None, typer.Argument(help="recording", metavar="INPUT.csv")] = None,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
-    ] = "classical,thondel2014",
+    ] = "mpc,thondel2014,classical",
     platform: Annotated[
         str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
     ] = "t2-compact",

@@ -48,7 +48,7 @@ class Tuning:
         perception: Weighting of the error: "none", "telban-cardullo" or "reid-nahon".
     """
 
-    algorithm: str = "thondel2014"
+    algorithm: str = "mpc"
     scale: float = 0.6
     gain: float = 0.7
     rotation_gain: float = 1.0

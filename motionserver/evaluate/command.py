@@ -28,7 +28,7 @@ from motionserver.settings.machine import load_machine
 
 def evaluate(
     input_csv: str | Path,
-    algorithms: Sequence[str] = ("thondel2014", "classical"),
+    algorithms: Sequence[str] = ("mpc", "thondel2014", "classical"),
     machine: Machine | None = None,
     scale: float | None = None,
     rate: float = RATE_HZ,

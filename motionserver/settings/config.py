@@ -93,7 +93,7 @@ class SourceSection(Strict):
 class CueingSection(Strict):
     """[cueing]: what starts; everything of it can be tuned live."""
 
-    algorithm: str = "thondel2014"
+    algorithm: str = "mpc"
     scale: Annotated[float, Field(ge=0.0, le=1.0)] = 0.6
     vehicle_head_m: tuple[Arm, Arm, Arm] = (0.0, 0.0, 0.0)
     budget_ms: Annotated[float, Field(ge=1.0, le=50.0)] = 10.0

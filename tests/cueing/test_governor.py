@@ -33,7 +33,7 @@ def candidate(goal, duration=1.5, knots=8, start=None):
     return Candidate(times, pose, velocity, acceleration)
 
 
-@pytest.mark.parametrize("refused", range(6))
+@pytest.mark.parametrize("refused", range(len(KAPPAS) + 1))
 def test_the_first_share_that_passes(refused):
     seen = []
 
@@ -44,7 +44,7 @@ def test_the_first_share_that_passes(refused):
     found = govern(candidate(-GOAL), PARENT, 0.7, 9, check)
     assert found.kappa == (*KAPPAS, 0.0)[refused]
     assert found.refusals == (NO,) * refused
-    assert len(seen) == min(refused + 1, 5)
+    assert len(seen) == min(refused + 1, len(KAPPAS))
     assert (found.plan.plan_id, found.plan.parent_id, found.plan.takeover) == (9, 3, 0.7)
 
 

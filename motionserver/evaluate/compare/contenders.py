@@ -20,7 +20,21 @@ RIVALS: Final = ("yardstick", "hindsight", "no motion")
 PREDICTING: Final = ("default", "constant", "preview")
 """Ways in which an algorithm that predicts is driven."""
 _WITHOUT_REFERENCE: Final = ("classical",)
-_OF_ALGORITHMS: Final = ("cueing/mpc", "cueing/thondel", "solvers/")
+_OF_ALGORITHMS: Final = (
+    "cueing/mpc",
+    "cueing/thondel",
+    "cueing/perception",
+    "cueing/predictor",
+    "cueing/tuning",
+    "cueing/vehicle_plant",
+    "cueing/standstill",
+    "cueing/side",
+    "cueing/scores",
+    "cueing/autoregression",
+    "cueing/reference_",
+    "solvers/",
+)
+"""Files a rival does not depend on; values of the tuning stand in its key themselves."""
 
 
 @dataclass(frozen=True, slots=True)
