@@ -24,7 +24,7 @@ from motionserver.cueing.mpc_cost import Cost
 from motionserver.cueing.mpc_grid import PIECES, make_spline_grid
 from motionserver.cueing.mpc_nominal import Nominal, Projection
 from motionserver.cueing.mpc_outputs import linearise
-from motionserver.cueing.mpc_rows import Rows
+from motionserver.cueing.mpc_rows import SLACK_UNIT, Rows
 from motionserver.cueing.mpc_stages import make_solver
 from motionserver.cueing.mpc_workspace import FREE, tuned_axes
 from motionserver.cueing.reference import Reference, believable
@@ -45,6 +45,7 @@ class SixAxis:
         tuning: Tunables.
         period: Planner period; the hand-over is one period ahead [s].
         pieces: Pieces of constant jerk over the horizon.
+        iterations: Fixed budget of the solver; None is the backend's own.
 
     Attributes:
         disturbance: Specific force nobody planned, as estimated outside, (3,) [m/s2].
@@ -57,8 +58,14 @@ class SixAxis:
     name = "mpc"
 
     def __init__(
-        self, machine: Machine, tuning: Tuning, period: float, pieces: int = PIECES
+        self,
+        machine: Machine,
+        tuning: Tuning,
+        period: float,
+        pieces: int = PIECES,
+        iterations: int | None = None,
     ) -> None:
+        self._iterations = iterations
         self._machine, self._period, self._pieces = machine, period, pieces
         self.disturbance: Array = np.zeros(3)
         self._slow = np.zeros(3)
@@ -74,7 +81,7 @@ class SixAxis:
         self._projection = Projection(grid)
         self._rows = Rows(self._machine, grid, self._period, tuning.box)
         self._cost = Cost(grid, self._rows.layout, tuning, self._period)
-        self._backend = make_solver(tuning.backend, grid, self._cost)
+        self._backend = make_solver(tuning.backend, grid, self._cost, self._iterations)
         slacks = self._rows.layout.slacks
         self._box = np.zeros(slacks), np.full(slacks, FREE)
 
@@ -96,7 +103,7 @@ class SixAxis:
             if (old.reference, old.predictor) != (tuning.reference, tuning.predictor):
                 reference = self._make_reference(tuning, self._grid.nodes)
             if old.backend != tuning.backend:
-                backend = make_solver(tuning.backend, self._grid, self._cost)
+                backend = make_solver(tuning.backend, self._grid, self._cost, self._iterations)
             self._reference, self._backend = reference, backend
             self._cost.weigh(tuning)
         self._tuning = tuning
@@ -135,7 +142,7 @@ class SixAxis:
             result.iterations,
             str(result.status),
             {
-                "leg_slack": float(result.x[0]),
+                "leg_slack": float(result.x[0]) * SLACK_UNIT,
                 "tilt_rate_slack": float(result.x[1:slacks].max()) * self._tuning.tilt_rate,
                 "wanted_x": float(wanted[0, 0]),
                 "wanted_y": float(wanted[0, 1]),

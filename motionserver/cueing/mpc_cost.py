@@ -24,8 +24,8 @@ ACCELERATION: Final = 0.002
 JERK: Final = 2e-6
 TILT_SLACK_SQUARE: Final = 1.0
 """Quadratic part of the price of tilting too fast, in units of the linear one."""
-LEG_SLACK: Final = (10000.0, 1000.0)
-"""Linear and quadratic price of leaving the legs' margins, per share of a limit."""
+LEG_SLACK: Final = (10.0, 0.001)
+"""Linear and quadratic price of leaving the legs' margins, per `SLACK_UNIT`."""
 
 
 class Cost:

@@ -28,6 +28,8 @@ FIRST_LENGTH: Final = 0.03
 """Before this no length changes enough to matter [s]."""
 EARLY: Final = 0.4
 """Leg acceleration and jerk are looked at until then [s]; later pieces are long and gentle."""
+SLACK_UNIT: Final = 1e-3
+"""Unit of the legs' slack, per share of a limit: in it, its high price is like the others."""
 SHARE: Final = 0.92
 """Share of leg speed, acceleration and jerk that a new plan may use: linearisation errs."""
 
@@ -90,9 +92,9 @@ class Rows:
         self._workspace = WorkspaceRows(machine, grid, box, int(ends[-1]))
         self.count = self._workspace.end
         self.matrix = np.zeros((self.count, layout.size))
-        self.matrix[self._length, 0] = -1.0
-        self.matrix[self._speed, 0] = -1.0
-        self.matrix[int(ends[-1]) :, 0] = -1.0
+        self.matrix[self._length, 0] = -SLACK_UNIT
+        self.matrix[self._speed, 0] = -SLACK_UNIT
+        self.matrix[int(ends[-1]) :, 0] = -SLACK_UNIT
         for knot in range(len(knots)):
             rows = self._tilt.start + 4 * knot
             self.matrix[rows : rows + 4, 1 + knot] = -1.0

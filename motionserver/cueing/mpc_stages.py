@@ -24,8 +24,8 @@ from motionserver.solvers.stage import Stage, StageBackend, StageProgramme, make
 
 JERK_UNIT: Final = 10.0
 """Unit of the inputs [m/s3, rad/s3]: with it they are of the size of the states."""
-SLACK_UNIT: Final = 1e-3
-"""Unit of the legs' slack: in it, its high price is of the size of the others."""
+TOLERANCE: Final = 1e-5
+"""Of an inexact method; at 1e-3 it was measured to leave nearly all of the cue away."""
 _STATES: Final = 18
 _AXES: Final = 6
 _SPARE: Final = 6
@@ -40,21 +40,24 @@ class _Place:
     inputs: int
 
 
-def make_solver(name: str, grid: SplineGrid, cost: Cost) -> QpBackend:
+def make_solver(
+    name: str, grid: SplineGrid, cost: Cost, iterations: int | None = None
+) -> QpBackend:
     """Solver of the condensed programme: dense, or by stages where the method is made for those.
 
     Args:
         name: Backend, see `solvers.registry`.
         grid: The grid of plans.
         cost: What fills the programme's cost.
+        iterations: Fixed budget of iterations; None is the backend's own.
 
     Raises:
         ValueError: There is no such backend, or its library is not there.
     """
-    dense = make_backend(name)
+    dense = make_backend(name, iterations, TOLERANCE)
     if name not in STAGED:
         return dense
-    return StagedProgramme(grid, cost, make_stage_backend(name), dense)
+    return StagedProgramme(grid, cost, make_stage_backend(name, iterations), dense)
 
 
 class StagedProgramme:
@@ -141,7 +144,7 @@ class StagedProgramme:
         return QpResult(x, result.status, result.iterations, result.usable)
 
     def _unstack(self, inputs: tuple[Array, ...], x: Array) -> None:
-        x[0] = SLACK_UNIT * inputs[0][-1]
+        x[0] = inputs[0][-1]
         for place, one in zip(self._places, inputs, strict=True):
             x[1 + place.tilts] = one[_AXES : _AXES + len(place.tilts)]
         jerks = JERK_UNIT * np.stack([one[:_AXES] for one in inputs])
@@ -212,8 +215,8 @@ class StagedProgramme:
             stage.R[tilts, tilts] = curvature[1 + place.tilts]
             stage.r[tilts] = price[1 + place.tilts]
             if number == 0:
-                stage.R[-1, -1] = SLACK_UNIT**2 * curvature[0]
-                stage.r[-1] = SLACK_UNIT * price[0]
+                stage.R[-1, -1] = curvature[0]
+                stage.r[-1] = price[0]
 
     def _fill_rows(
         self,
@@ -238,8 +241,8 @@ class StagedProgramme:
             stage.D[here, :_AXES] = JERK_UNIT * look[:, _STATES:]
             stage.D[here, _AXES : _AXES + len(place.tilts)] = part[:, 1 + place.tilts]
             if number:
-                stage.C[here, _STATES] = SLACK_UNIT * part[:, 0]
+                stage.C[here, _STATES] = part[:, 0]
             else:
-                stage.D[here, -1] = SLACK_UNIT * part[:, 0]
+                stage.D[here, -1] = part[:, 0]
             stage.lower[here], stage.upper[here] = lower[chosen], upper[chosen]
             stage.lower[here.stop :], stage.upper[here.stop :] = -np.inf, np.inf

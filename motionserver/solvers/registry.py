@@ -22,6 +22,9 @@ REFERENCE: Final = "reference"
 STAGED: Final = {"hpipm": ("motionserver.solvers.hpipm", "HpipmStages")}
 """Module and class of those that also solve programmes by stages."""
 
+INEXACT: Final = frozenset({"osqp"})
+"""Backends that stop at a tolerance which can be felt."""
+
 OPTIONAL: Final = frozenset({"hpipm"})
 """Backends whose library is an extra of the package."""
 
@@ -35,13 +38,16 @@ def present(name: str) -> bool:
     return True
 
 
-def make_backend(name: str, iterations: int | None = None) -> QpBackend:
+def make_backend(
+    name: str, iterations: int | None = None, tolerance: float | None = None
+) -> QpBackend:
     """Make a fresh backend.
 
     Args:
         name: One of `BACKENDS`, or `REFERENCE`.
         iterations: Fixed budget of iterations; None is the backend's own. See `QpBackend` for what
             a result is worth when it is used up.
+        tolerance: Of a method that is inexact; the others need none.
 
     Raises:
         ValueError: There is no such backend, its library cannot be imported, or the budget is not
@@ -60,7 +66,10 @@ def make_backend(name: str, iterations: int | None = None) -> QpBackend:
             f"QP backend {name!r}: a budget of {iterations} iterations finds nothing; allowed is "
             "1 or more, or None for the backend's own"
         )
-    return _make(name, {} if iterations is None else {"iterations": iterations})
+    options: dict[str, Any] = {} if iterations is None else {"iterations": iterations}
+    if tolerance is not None and name in INEXACT:
+        options["tolerance"] = tolerance
+    return _make(name, options)
 
 
 def make_stage_backend(name: str, iterations: int | None = None) -> StageBackend:

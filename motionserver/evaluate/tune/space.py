@@ -81,6 +81,7 @@ SPACES: Final[dict[str, tuple[Parameter, ...]]] = {
         _around("mpc_weight_rates", 10.0),
         _around("mpc_weight_heave", 5.0),
         _around("mpc_weight_tilt_rate", 5.0),
+        _around("mpc_trust_s", 3.0),
         # "vehicle" needs pedals and steering, which few recordings hold; a predictor for "learned"
         # may have been fitted to the very recording that is held out
         Parameter("reference", choices=("constant", "fade", "ar")),
