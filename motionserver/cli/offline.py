@@ -35,6 +35,22 @@ def run_evaluate(recording: Path, options: EvaluateOptions) -> int:
     return 0 if result.violations == 0 else 1
 
 
+def run_predictions(recording: Path, options: EvaluateOptions) -> int:
+    """Print how well each reference model foretells a recording."""
+    from motionserver.cueing.reference import MODELS
+    from motionserver.evaluate.predictions import predictions, to_text
+    from motionserver.evaluate.recording import read_recording
+
+    tuning = options.tuning()
+    # a recording holds no pedals: the model that needs them would be another one's double
+    models = [name for name in MODELS if name != "vehicle"]
+    found = predictions(
+        read_recording(recording), models, predictor=tuning.predictor, scale=tuning.scale
+    )
+    sys.stdout.write(to_text(found))
+    return 0
+
+
 def run_compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
     """Compare on all recordings of a folder; 1 if any limit was broken."""
     from motionserver.evaluate.compare.command import compare

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from motionserver.cli import commands, offline
+from motionserver.cli import judging as commands
+from motionserver.cli import offline
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
