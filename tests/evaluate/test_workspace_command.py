@@ -60,7 +60,7 @@ def run(*words):
 
 def test_check_keeps_what_it_said_and_adds_the_workspace(written):
     _, text = written
-    for words in (": valid", "platform   moog", "machine    t2-compact", "planner    thondel2014"):
+    for words in (": valid", "platform   moog", "machine    t2-compact", "planner    mpc"):
         assert words in text
     for words in ("surge    -0.199 m  legs 1 6 long", "+16.32 deg  legs 3 4 long", "warning: "):
         assert words in text
@@ -230,7 +230,7 @@ def test_without_a_shelf_or_limits_nothing_is_claimed():
     text = workspace_text(machine, default_for(machine))
     assert text.count("not checked") == 2
     assert "conditioning " not in text.split("ended by")[2]
-    smaller = apply_changes(default_for(machine), {"box_roll_deg": 5.0, "legs": False})
+    smaller = apply_changes(default_for(machine), {"algorithm": "thondel2014", "box_roll_deg": 5.0, "legs": False})
     assert "keeps to the box alone" in " ".join(workspace_text(machine, smaller).split())
 
 

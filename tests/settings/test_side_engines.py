@@ -43,7 +43,7 @@ def test_a_tuning_that_cannot_be_used_is_taken_back(machine_book):
     book.answer({"op": "tune", "if_version": 2, "changes": {"algorithm": "classical"}})
     refusal = book.take_back("classical cannot be made: broken")
     assert (refusal["ok"], refusal["kind"], refusal["version"]) == (False, "invalid", 4)
-    assert (book.model.algorithm, book.model.scale) == ("thondel2014", 0.3)
+    assert (book.model.algorithm, book.model.scale) == ("mpc", 0.3)
     book.answer({"op": "undo", "if_version": 4})
     assert book.model.scale == 0.6
     # and after an undo that cannot be used

@@ -411,7 +411,7 @@ def test_bad_presets_are_not_saved(world, name, body):
 
 def test_status_says_what_it_must(world):
     data = world.client().get("/api/status").json()
-    assert (data["state"], data["algorithm"]) == ("PARKED", "thondel2014")
+    assert (data["state"], data["algorithm"]) == ("PARKED", "mpc")
     assert len(data["x_max"]) == 6
     assert set(data["processes"]) == {"guard", "planner", "web", "spare", "service"}
     assert data["processes"]["spare"]["alive"] is True
@@ -520,4 +520,4 @@ def test_metrics_compare_the_engines(world):
         for sample in family.samples
         if sample.name == "motionserver_engine_nrmse"
     }
-    assert values == {"thondel2014": 0.412, "classical": 0.594}
+    assert values == {"mpc": 0.31, "classical": 0.594}
