@@ -37,12 +37,14 @@ class Report:
         iterations: Iterations of the solver, summed over its problems; 0 without a solver.
         solver_status: Short word: "solved", "none", or why there is no candidate.
         numbers: Anything else worth a curve, by name, SI.
+        reference: What the forecast rests on now, in a few words; empty without a forecast.
     """
 
     x_max: Array
     iterations: int = 0
     solver_status: str = "none"
     numbers: dict[str, float] = field(default_factory=dict)
+    reference: str = ""
 
 
 class Cueing(Protocol):

@@ -151,6 +151,7 @@ class SixAxis:
                 "t_fill": filled - linearised,
                 "t_solve": solved - filled,
             },
+            self._reference.describe(),
         )
         return self._candidate(start, nominal, result.x[slacks:].reshape(6, -1).T)
 

@@ -212,6 +212,7 @@ class Thondel:
                 "predicted_y": float(force[1]),
                 "predicted_z": float(force[2]),
             },
+            self._reference.describe(),
         )
 
     def adopt(self, plan: Plan, kappa: float) -> None:

@@ -148,6 +148,7 @@ class PlannerView:
                 "status": "none" if report is None else report.solver_status,
                 **timing.summary(),
             },
+            "reference": "" if report is None else report.reference,
             "kappa": None if proposal is None else proposal.kappa,
             "trouble": "" if thought is None else thought.trouble[:300],
             "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],

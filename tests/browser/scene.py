@@ -201,6 +201,7 @@ class Scene:
             "wanted_rates": [0.0, 0.0, 0.02],
             "source": {"kind": "udp", "address": "10.0.0.12:40312", "age_s": 0.006,
                        "rate_hz": 99.8, "mode": "DRIVE", "fresh": True, "session": 71},
+            "reference": "ar",
             "solver": {"backend": self.book.model.backend, "time_p50_ms": 1.3,
                        "time_p99_ms": 2.4, "last_ms": 1.2, "iterations": 27, "status": "solved"},
             "kappa": 1.0,

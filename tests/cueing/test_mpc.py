@@ -231,3 +231,9 @@ def test_with_perceived_error_it_cues_otherwise_and_stays_inside(perception):
 def test_a_perception_that_does_not_exist_is_refused():
     with pytest.raises(ValueError, match="allowed: none, telban-cardullo, reid-nahon"):
         SixAxis(MACHINE, Tuning(algorithm="mpc", perception="dog"), 0.01)
+
+
+def test_the_report_says_what_the_forecast_rests_on():
+    cueing = SixAxis(MACHINE, Tuning(algorithm="mpc", reference="vehicle"), 0.01)
+    play(MACHINE, cueing, brake(3))
+    assert cueing.report().reference == "vehicle: no driver inputs, ar instead"

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from own_hexapod import NO_VIOLATIONS, RECORDINGS, own_violations
 
+from motionserver.cueing.mpc import SixAxis
+from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import no_motion
@@ -18,6 +20,7 @@ from motionserver.evaluate.lockstep import drive
 from motionserver.evaluate.metrics.figures import rmse_xy
 from motionserver.evaluate.recording import read_recording
 from motionserver.settings.machine import load_machine
+from motionserver.solvers.registry import present
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(7200)]
 
@@ -84,3 +87,30 @@ def test_trouble_costs_little(algorithm, reference):
     for name, one, other in zip(NAMES, plain, troubled, strict=True):
         print(f"{algorithm} {reference} {name}: nRMSE {one:.3f} -> {other:.3f}")
     assert troubled.mean() <= MOST * plain.mean()
+
+
+STARVING = Disturbance(seed=2, stalled=0.05, stall=0.05, failed=0.5, nan=0.01)
+
+
+@pytest.mark.parametrize("backend", ["piqp", "osqp", "hpipm"])
+@pytest.mark.parametrize("name", ["truck_brake_accel", "truck_rough_road"])
+def test_starved_it_still_moves_and_stays_inside(name, backend):
+    """One iteration where the method allows it, stalls, and half of the solves failing."""
+    if not present(backend):
+        pytest.skip(f"{backend} is not installed")
+    tuning = Tuning(algorithm="mpc", scale=0.6, backend=backend)
+    period = 0.01
+    homes = MACHINE.parked_pose[None]
+    thinker = Thinker(
+        MACHINE, tuning, period, homes, SixAxis(MACHINE, tuning, period, iterations=1)
+    )
+    driven = drive(MACHINE, recorded(name), tuning, thinker=thinker, disturbance=STARVING)
+    kappa = driven.periods.kappa
+    still = rmse_xy(no_motion(MACHINE, recorded(name), 0.6))
+    print(
+        f"{backend} starved, {name}: nRMSE {rmse_xy(driven) / still:.3f}, whole "
+        f"{np.mean(kappa == 1.0):.1%}, halved {np.mean((kappa > 0) & (kappa < 1)):.1%}, refused "
+        f"{np.mean(kappa == 0.0):.1%}, without a plan {np.mean(np.isnan(kappa)):.1%}"
+    )
+    assert own_violations(driven.pose, driven.rate) == NO_VIOLATIONS
+    assert driven.periods.rejections == {}

@@ -230,7 +230,9 @@ def test_without_a_shelf_or_limits_nothing_is_claimed():
     text = workspace_text(machine, default_for(machine))
     assert text.count("not checked") == 2
     assert "conditioning " not in text.split("ended by")[2]
-    smaller = apply_changes(default_for(machine), {"algorithm": "thondel2014", "box_roll_deg": 5.0, "legs": False})
+    smaller = apply_changes(
+        default_for(machine), {"algorithm": "thondel2014", "box_roll_deg": 5.0, "legs": False}
+    )
     assert "keeps to the box alone" in " ".join(workspace_text(machine, smaller).split())
 
 

@@ -73,6 +73,7 @@ export function showNumbers(status) {
     ["Solver p50 / p99", `${fixed(solver.time_p50_ms, 1)} / ${fixed(solver.time_p99_ms, 1)} ms`],
     ["Tick late p50 / p99", `${fixed(tick.late_p50_ms, 2)} / ${fixed(tick.late_p99_ms, 2)} ms`],
     ["Solver", `${solver.backend || "–"}, ${solver.status || "–"}, ${fixed(solver.iterations, 0)} it.`],
+    ["Forecast", p.reference || "–"],
     ["Tick late max, missed", `${fixed(tick.late_max_ms, 1)} ms, ${fixed(tick.missed, 0)}`, tick.missed > 0],
     ["Plan share κ", fixed(p.kappa ?? g.plan?.kappa, 3)],
     ["Tracking error", isNumber(g.tracking_error) ? fixed(1e3 * g.tracking_error, 2, "mm") : "–"],
