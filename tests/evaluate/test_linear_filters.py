@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motionserver.cueing.perception import TELBAN_CARDULLO
 from motionserver.evaluate.metrics.linear import bands, lag, low_pass, rms
-from motionserver.evaluate.metrics.perceived import CANALS, OTOLITHS, perceived
+from motionserver.evaluate.metrics.perceived import perceived, sensed
 
 DT = 0.002
+CANALS, OTOLITHS = TELBAN_CARDULLO.roll, TELBAN_CARDULLO.force
 
 
 def gain_of(filtered, omega, times):
@@ -55,15 +57,15 @@ def test_organs_are_their_published_transfer_functions(omega):
 def test_simulated_organs_have_their_gain(organ):
     omega = 2.0
     times = np.arange(0.0, 100.0, 0.01)
-    sensed = organ.sensed(np.sin(omega * times), 0.01)
-    assert gain_of(sensed, omega, times) == pytest.approx(abs(organ.response(omega)), rel=0.01)
+    felt = sensed(organ, np.sin(omega * times), 0.01)
+    assert gain_of(felt, omega, times) == pytest.approx(abs(organ.response(omega)), rel=0.01)
 
 
 def test_perceived_puts_forces_first():
     force, rates = np.ones((20, 3)), np.ones((20, 3))
-    sensed = perceived(force, rates, DT)
-    assert sensed[:, :3] == pytest.approx(0.4)
-    assert sensed[:, 3:] == pytest.approx(0.0, abs=1e-12)
+    both = perceived(force, rates, DT)
+    assert both[:, :3] == pytest.approx(0.4)
+    assert both[:, 3:] == pytest.approx(0.0, abs=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(20, 400))
