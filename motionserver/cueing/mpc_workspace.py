@@ -38,6 +38,8 @@ CONDITION_NEAR: Final = 1.6
 """Multiple of the least conditioning up to which they are."""
 CONDITION_KEPT: Final = 1.15
 """Multiple of the least conditioning that a new plan keeps: it is far from linear."""
+LOOK_EVERY: Final = 4
+"""Periods from one look at a distant limit to the next."""
 KEPT: Final = 0.97
 """Share of a limit that a new plan may use."""
 FREE: Final = 1e20
@@ -76,6 +78,9 @@ class WorkspaceRows:
             slice(int(a), int(b)) for a, b in pairwise(ends)
         )
         self.end = int(ends[-1])
+        # nothing is known yet: look at all of them at once
+        self._near = {0, 1, 2}
+        self._turn = 0
 
     def fill(self, nominal: Nominal, box: Array, put: Put, leave: Callable[[slice], None]) -> None:
         """Write the rows with ``put``, or ``leave`` those that are far from mattering.
@@ -88,12 +93,21 @@ class WorkspaceRows:
         """
         if self.axes:
             self._fill_box(nominal.pose, box, put)
-        for rows, fill in (
-            (self.joint, self._fill_joints),
-            (self.condition, self._fill_conditioning),
-            (self.passenger, self._fill_passenger),
+        self._turn += 1
+        for kind, (rows, fill) in enumerate(
+            (
+                (self.joint, self._fill_joints),
+                (self.condition, self._fill_conditioning),
+                (self.passenger, self._fill_passenger),
+            )
         ):
-            if rows.stop > rows.start and not fill(nominal, put):
+            due = kind in self._near or (self._turn + kind) % LOOK_EVERY == 0
+            if rows.stop == rows.start or not due:
+                continue
+            if fill(nominal, put):
+                self._near.add(kind)
+            else:
+                self._near.discard(kind)
                 leave(rows)
 
     def _fill_box(self, pose: Array, box: Array, put: Put) -> None:
