@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from motionserver.core.axes import Array
+from motionserver.core.axes import Array, Axis
 from motionserver.core.kinematics.hexapod import (
     conditioning,
     is_conditioned,
@@ -91,8 +91,7 @@ class WorkspaceRows:
             put: Writes rows.
             leave: Makes rows say nothing.
         """
-        if self.axes:
-            self._fill_box(nominal.pose, box, put)
+        self._fill_box(nominal.pose, box, put)
         self._turn += 1
         for kind, (rows, fill) in enumerate(
             (
@@ -117,7 +116,7 @@ class WorkspaceRows:
         side = np.where(value >= 0.0, 1.0, -1.0)
         gradient = np.zeros((len(nodes), 6))
         gradient[np.arange(len(nodes)), axes] = side / box[axes]
-        put(self.box, gradient, self._grid.at_nodes.pose[nodes], KEPT - side * value)
+        put(self.box, gradient, self._grid.at_nodes.pose[nodes], 1.0 - side * value)
 
     def _fill_joints(self, nominal: Nominal, put: Put) -> bool:
         machine, limit = self._machine, self._machine.joint_angle
@@ -166,11 +165,14 @@ class WorkspaceRows:
 
 
 def tuned_axes(machine: Machine, box: Array) -> tuple[int, ...]:
-    """Axes whose tuned limit is below the machine's.
+    """Axes whose position limit has rows: all angles, and translations tuned below the machine's.
 
-    The machine's own box holds for single axes; combined, the legs alone decide.
+    The machine's own box holds for single axes; combined, the legs decide on translations. Angles
+    beyond it lead to where joints and conditioning end the workspace, which is far from linear.
     """
-    return tuple(int(axis) for axis in np.flatnonzero(box < TUNED * machine.box))
+    limited = box < TUNED * machine.box
+    limited[Axis.ROLL :] = True
+    return tuple(int(axis) for axis in np.flatnonzero(limited))
 
 
 def _nudged(poses: Array) -> Array:
