@@ -22,6 +22,13 @@ AR_REST_FADE: Final = 0.2
 """How fast what the low-pass took away fades [s]."""
 LARGEST: Final = 8.0
 """Bound of a forecast force [m/s2]."""
+BACK: Final = 0.5
+"""Share of what was seen on one side that is believed of the other."""
+SEEN_FADE: Final = 4.0
+"""How long what was seen counts as what can be [s]."""
+BEYOND: Final = 1.1
+"""A forecast reaches at most so many times as far as anything seen: at the onset of braking the
+model would run on along the ramp, and platform and force would go the wrong way to make room."""
 
 
 class LowPassed:
@@ -77,6 +84,8 @@ class SlowSignals:
         self, period: float, instants: Array, signals: int, bound: float = LARGEST
     ) -> None:
         self._bound = bound
+        self._seen = np.zeros((2, signals))
+        self._forget = exp(-period / SEEN_FADE)
         self.passed = LowPassed(period, signals)
         self._stride = self.passed.stride
         self._models = [AutoRegression(AR_ORDER) for _ in range(signals)]
@@ -110,7 +119,13 @@ class SlowSignals:
                 self._maps[signal] = self._map(model)
         ahead = (self._maps @ sampled[:-1].T[:, :, None])[:, :, 0].T
         rest = (now - self.passed.slow) * self._rest_decay
-        forecast: Array = np.clip(ahead, -self._bound, self._bound) + rest
+        if np.isfinite(now).all():
+            both = np.stack((-now, now))
+            self._seen = np.maximum(self._forget * self._seen, both)
+        # what swings one way may swing back, though not as far as long as it has not
+        reach = BEYOND * np.maximum(self._seen, BACK * self._seen[::-1])
+        low, high = np.minimum(reach, self._bound)
+        forecast: Array = np.clip(ahead, -low, high) + rest
         return forecast
 
 
