@@ -116,7 +116,8 @@ class WorkspaceRows:
         side = np.where(value >= 0.0, 1.0, -1.0)
         gradient = np.zeros((len(nodes), 6))
         gradient[np.arange(len(nodes)), axes] = side / box[axes]
-        put(self.box, gradient, self._grid.at_nodes.pose[nodes], 1.0 - side * value)
+        kept = np.where(box[axes] < TUNED * self._machine.box[axes], KEPT, 1.0)
+        put(self.box, gradient, self._grid.at_nodes.pose[nodes], kept - side * value)
 
     def _fill_joints(self, nominal: Nominal, put: Put) -> bool:
         machine, limit = self._machine, self._machine.joint_angle

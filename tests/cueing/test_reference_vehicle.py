@@ -47,8 +47,8 @@ def test_pedals_and_wheel_foretell_more_than_the_past_does(car):
         for name in ("vehicle", "ar")
     )
     # surge, sway, yaw rate; the further ahead, the more depends on what the driver does next
-    assert (vehicle[:, 0] < np.array([0.85, 0.85, 0.92]) * ar[:, 0]).all()
-    assert (vehicle[:, 1] < np.array([0.9, 0.92, 0.95]) * ar[:, 1]).all()
+    assert (vehicle[:, 0] < np.array([0.85, 0.85, 0.94]) * ar[:, 0]).all()
+    assert (vehicle[:, 1] < np.array([0.9, 0.94, 0.95]) * ar[:, 1]).all()
     assert (vehicle[:, 5] < np.array([0.6, 0.75, 0.97]) * ar[:, 5]).all()
 
 
