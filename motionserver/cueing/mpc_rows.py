@@ -18,7 +18,7 @@ from motionserver.core.kinematics.hexapod import jacobian, leg_lengths
 from motionserver.core.limits import Machine
 from motionserver.core.state import PlatformState
 from motionserver.cueing.mpc_grid import SplineGrid
-from motionserver.cueing.mpc_legs import NominalLegs
+from motionserver.cueing.mpc_legs import LegExtremes, NominalLegs
 from motionserver.cueing.mpc_nominal import Nominal
 from motionserver.cueing.mpc_outputs import Outputs
 from motionserver.cueing.mpc_workspace import FREE, WorkspaceRows
@@ -26,8 +26,12 @@ from motionserver.cueing.thondel_legs import margins_over, way_home_gains, with_
 
 FIRST_LENGTH: Final = 0.03
 """Before this no length changes enough to matter [s]."""
-EARLY: Final = 0.4
-"""Leg acceleration and jerk are looked at until then [s]; later pieces are long and gentle."""
+JERKY: Final = 0.4
+"""Leg jerk is looked at until then [s]: later pieces are long."""
+TURNING: Final = 0.25
+"""From then on both sides of leg speed are looked at [s]: it may change its sign until then."""
+EARLY: Final = 1.0
+"""Leg acceleration is looked at until then [s]; later pieces are gentle."""
 SLACK_UNIT: Final = 1e-3
 """Unit of the legs' slack, per share of a limit: in it, its high price is like the others."""
 SHARE: Final = 0.92
@@ -74,26 +78,30 @@ class Rows:
         self._late = np.flatnonzero(grid.nodes > FIRST_LENGTH)
         self._lengths = way_home_gains(maps.pose[self._late, None])[:, 0]
         margins = margins_over(grid.nodes[self._late])
-        self._speeds = maps.velocity[knots]
+        self._rates = maps.velocity[knots]
+        self._turning = np.flatnonzero(grid.nodes > TURNING)
         self._early = knots[grid.nodes[knots] <= EARLY]
         self._accelerations = maps.acceleration[self._early]
-        self._jerky = knots[: len(self._early)] if machine.leg_jerk is not None else knots[:0]
+        self._jerky = knots[grid.nodes[knots] <= JERKY]
+        if machine.leg_jerk is None:
+            self._jerky = knots[:0]
         self._jerks = grid.basis[: len(self._jerky)]
         sizes = (
             6 * len(self._lengths),
-            6 * len(knots),
+            6 * len(grid.nodes),
+            6 * len(self._turning),
             6 * len(self._early),
             6 * len(self._jerky),
             4 * len(knots),
         )
         ends = np.cumsum((0, *sizes))
         blocks = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-        self._length, self._speed, self._acceleration, self._jerk, self._tilt = blocks
+        self._length, self._speed, self._back, self._acceleration, self._jerk, self._tilt = blocks
         self._workspace = WorkspaceRows(machine, grid, box, int(ends[-1]))
         self.count = self._workspace.end
         self.matrix = np.zeros((self.count, layout.size))
         self.matrix[self._length, 0] = -SLACK_UNIT
-        self.matrix[self._speed, 0] = -SLACK_UNIT
+        self.matrix[self._speed, 0] = self.matrix[self._back, 0] = -SLACK_UNIT
         self.matrix[int(ends[-1]) :, 0] = -SLACK_UNIT
         for knot in range(len(knots)):
             rows = self._tilt.start + 4 * knot
@@ -146,15 +154,7 @@ class Rows:
             (np.concatenate((length.low, way)) - self._middle) / self._half,
             self._allowed,
         )
-        limit, speed = machine.leg_speed, seen.speed.around(knots)
-        self._near(
-            self._speed,
-            gradient[knots] / limit,
-            self._speeds,
-            speed.high / limit,
-            speed.low / limit,
-            SHARE,
-        )
+        self._speeds(gradient[:count] / machine.leg_speed, seen)
         limit, early = machine.leg_acceleration, seen.acceleration.around(self._early)
         self._both(
             self._acceleration,
@@ -199,6 +199,18 @@ class Rows:
         self._put(rows, np.where(over, 1.0, -1.0)[..., None] * gradient, gains)
         self._upper[rows] = (allowed - np.where(over, high, -low)).ravel()
 
+    def _speeds(self, gradient: Array, seen: LegExtremes) -> None:
+        nodes, turning, limit = np.arange(len(gradient)), self._turning, self._machine.leg_speed
+        speed = seen.speed.around(nodes)
+        high, low, gains = speed.high / limit, speed.low / limit, self._grid.at_nodes.velocity
+        self._near(self._speed, gradient, gains, high, low, SHARE)
+        over = (high >= -low)[turning]
+        self._put(
+            self._back, np.where(over, -1.0, 1.0)[..., None] * gradient[turning], gains[turning]
+        )
+        room = SHARE - np.where(over, -low[turning], high[turning])
+        self._upper[self._back] = room.ravel()
+
     def _both(self, rows: slice, gradient: Array, gains: Array, high: Array, low: Array) -> None:
         self._put(rows, gradient, gains)
         self._upper[rows] = (SHARE - high).ravel()
@@ -217,7 +229,7 @@ class Rows:
         scaled = outputs.by_velocity[knots, :2] / limit
         gradient = np.zeros((len(knots), 4, 6))
         gradient[:, :2, 3:], gradient[:, 2:, 3:] = scaled, -scaled
-        self._put(self._tilt, gradient, self._speeds)
+        self._put(self._tilt, gradient, self._rates)
         value = outputs.value[knots, 3:5] / limit
         above = 1.0 + np.maximum(wanted, 0.0) / limit - value
         below = 1.0 - np.minimum(wanted, 0.0) / limit + value

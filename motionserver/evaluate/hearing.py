@@ -14,8 +14,8 @@ from motionserver.core.intake.intake import Intake
 from motionserver.core.state import Preview, VehicleMotion
 from motionserver.evaluate.recording import Recording
 
-PREVIEW_STEP: Final = 0.05
-"""Spacing of a preview's samples [s]."""
+PREVIEW_STEP: Final = 0.01
+"""Spacing of a preview's samples [s]: all that a recording holds, more than a packet carries."""
 LONGEST_PREVIEW: Final = 4.0
 """A preview further ahead is not told [s]."""
 _BLOCK: Final = 512
