@@ -145,9 +145,9 @@ def test_preview_is_told_ahead_and_ends_with_the_recording():
     ramp = from_samples("ramp", times, force, np.zeros((101, 3)), np.zeros(101))
     thinker = Listener(MACHINE, Tuning(algorithm="classical"), 0.01, MACHINE.parked_pose[None])
     drive(MACHINE, ramp, Tuning(scale=0.5), preview=0.5, thinker=thinker)
-    assert heard[20].times == pytest.approx(np.arange(1, 11) * 0.05)
+    assert heard[20].times == pytest.approx(np.arange(1, 51) * 0.01)
     assert heard[20].force[:, 0] == pytest.approx(0.5 * (0.2 + heard[20].times))
-    assert len(heard[80].times) == 4
+    assert len(heard[80].times) == 20
     assert heard[100] is None
 
 
