@@ -6,7 +6,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from time import monotonic, perf_counter_ns, sleep, thread_time_ns
+from time import monotonic, perf_counter, perf_counter_ns, sleep, thread_time_ns
 from typing import Final
 
 import numpy as np
@@ -22,6 +22,7 @@ from motionserver.core.safety.accept import accept_proposal, accept_rest
 from motionserver.core.safety.verdict import Rejection
 from motionserver.core.state import PlatformState, Stimulus, VehicleMotion
 from motionserver.cueing.base import Candidate, Cueing, Report
+from motionserver.cueing.mpc import SixAxis
 from motionserver.cueing.registry import Maker, make_cueing
 from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
@@ -126,6 +127,13 @@ class Times:
         return float(np.sqrt(np.mean(np.sum(np.square(self.error), axis=1))))
 
 
+def _timed(cueing: Cueing) -> Cueing:
+    """Give a clock to an algorithm that tells what its parts take."""
+    if isinstance(cueing, SixAxis):
+        cueing.clock = perf_counter
+    return cueing
+
+
 def time_plans(
     machine: Machine,
     tuning: Tuning,
@@ -156,7 +164,7 @@ def time_plans(
     if isinstance(rest, Rejection):
         raise BenchError(f"bench plan: {machine.name} cannot stand at neutral ({rest})")
     thinker = Thinker(machine, tuning, PERIOD, homes)
-    thinker.cueing = clocked = Clocked(make(machine, tuning, PERIOD))
+    thinker.cueing = clocked = Clocked(_timed(make(machine, tuning, PERIOD)))
     intake, head = Intake(), Head(np.zeros(3), tuning.scale)
     playback, out = Playback(rest), Times()
     left = right = np.random.default_rng(0).standard_normal((KERNEL_SIZE, KERNEL_SIZE))
@@ -164,7 +172,7 @@ def time_plans(
     for number, motion in zip(range(1, ticks + 1), _motions(begin), strict=False):
         if thinker.cueing is not clocked:
             # it raised: the thinker makes a fresh one then
-            thinker.cueing = clocked = Clocked(thinker.cueing)
+            thinker.cueing = clocked = Clocked(_timed(thinker.cueing))
         due += PERIOD
         if paced:
             sleep(max(0.0, due - monotonic()))
