@@ -21,7 +21,11 @@ YAW_SHARE: Final = 6.0
 VELOCITY: Final = (0.05, 0.02)
 """Price of moving, translations [per (m/s)2] and angles [per (rad/s)2]."""
 ACCELERATION: Final = 0.002
-JERK: Final = 2e-6
+JERK: Final = np.repeat((2e-6, 1e-4), 3)
+"""Price of jerk per axis, per (m/s3)2 and (rad/s3)2. That of angles also keeps the plan from
+trading yaw against roll from period to period: with 2e-6 a platform at its legs' ends was measured
+to shake by 0.4 m/s2."""
+JERK.setflags(write=False)
 TILT_SLACK_SQUARE: Final = 1.0
 """Quadratic part of the price of tilting too fast, in units of the linear one."""
 LEG_SLACK: Final = (10.0, 0.001)
@@ -89,7 +93,7 @@ class Cost:
         for axis, place in enumerate(places):
             speed = VELOCITY[0] if axis < 3 else VELOCITY[1]
             self._prices[:, axis] = place, speed, ACCELERATION
-            block = JERK * (grid.basis.T @ (lengths * grid.basis))
+            block = JERK[axis] * (grid.basis.T @ (lengths * grid.basis))
             for price, gain in zip(
                 self._prices[:, axis], (maps.pose, maps.velocity, maps.acceleration), strict=True
             ):
@@ -105,7 +109,7 @@ class Cost:
         self._constant = constant
         self._linear[0], self._linear[1 : layout.slacks] = LEG_SLACK[0], tilt
         self._pulls = [(gain * share).T for gain in (maps.pose, maps.velocity, maps.acceleration)]
-        self._jerk_pull = JERK * (lengths * grid.basis).T
+        self._jerk_pull = (lengths * grid.basis).T
 
     def remember(self, start: PlatformState, wanted: Array, arm: Array) -> None:
         """Let the organs take in what is felt at the hand-over against what is ``wanted`` (6,)."""
@@ -151,7 +155,7 @@ class Cost:
         slacks = layout.slacks
         np.copyto(self._hessian, self._constant)
         self._hessian[slacks:, slacks:] += flat.T @ flat
-        pull = self._jerk_pull @ nominal.jerks
+        pull = self._jerk_pull @ (JERK * nominal.jerks)
         motion = (nominal.pose, nominal.velocity, nominal.acceleration)
         for price, gain, part in zip(self._prices, self._pulls, motion, strict=True):
             pull += gain @ (price * part)

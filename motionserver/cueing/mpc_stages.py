@@ -119,7 +119,7 @@ class StagedProgramme:
         for piece, (gain, length) in enumerate(zip(grid.basis, np.diff(grid.edges), strict=True)):
             stage = min(piece, self.count - 1)
             one = gain @ self._to_stage[stage]
-            self._constant[stage] += np.kron(JERK * length * np.outer(one, one), np.eye(_AXES))
+            self._constant[stage] += np.kron(length * np.outer(one, one), np.diag(JERK))
 
     def solve(self, vectors: QpVectors, matrices: QpMatrices | None = None) -> QpResult:
         """Solve the condensed programme by stages; see `QpBackend.solve`.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from motionserver.core.axes import GRAVITY
 from motionserver.core.kinematics.rotation import felt
 from motionserver.core.plan import Plan, rest_at
-from motionserver.core.state import PlatformState
+from motionserver.core.state import PlatformState, Preview
 from motionserver.cueing.mpc import SixAxis
 from motionserver.cueing.mpc_grid import jerk_maps, make_spline_grid
 from motionserver.cueing.mpc_nominal import Projection
@@ -237,3 +237,17 @@ def test_the_report_says_what_the_forecast_rests_on():
     cueing = SixAxis(MACHINE, Tuning(algorithm="mpc", reference="vehicle"), 0.01)
     play(MACHINE, cueing, brake(3))
     assert cueing.report().reference == "vehicle: no driver inputs, ar instead"
+
+
+def test_at_the_legs_ends_it_does_not_shake():
+    """Braking on and on, foretold: what is felt must stay near what is wanted, also sideways."""
+    times = np.arange(1, 201) * 0.01
+    force = np.tile((-1.6, -0.16, 0.0), (200, 1))
+    preview = Preview(times, force, np.zeros((200, 3)))
+    stimulus = stimulus_of((-1.6, -0.16, 0.0), preview=preview)
+    cueing = SixAxis(MACHINE, Tuning(algorithm="mpc"), 0.01)
+    played = play(MACHINE, cueing, [stimulus] * 700)
+    felt_force, _ = played.felt(MACHINE)
+    late = felt_force[-1000:, 1]
+    assert np.std(late) < 0.05
+    assert np.mean(np.array(played.kappas[-200:]) == 1.0) > 0.98
