@@ -17,6 +17,11 @@ ALARM: Final = 1.5
 """Slow mismatch that means the sensor or the platform is wrong [m/s2]."""
 
 
+def believed(disturbance: Array) -> Array:
+    """A disturbance (3,) as an algorithm may use it: what is no number is none, and bounded."""
+    return np.clip(np.nan_to_num(disturbance), -MOST, MOST)
+
+
 class MeasuredForce:
     """What the platform's own accelerometer says against what the plan should give.
 

@@ -20,21 +20,20 @@ from motionserver.core.limits import Machine
 from motionserver.core.plan import Plan
 from motionserver.core.state import PlatformState, Stimulus
 from motionserver.cueing.base import Candidate, Report
+from motionserver.cueing.measured import believed
 from motionserver.cueing.mpc_cost import Cost
 from motionserver.cueing.mpc_grid import PIECES, make_spline_grid
 from motionserver.cueing.mpc_nominal import Nominal, Projection
 from motionserver.cueing.mpc_outputs import linearise
 from motionserver.cueing.mpc_rows import SLACK_UNIT, Rows
 from motionserver.cueing.mpc_stages import make_solver
-from motionserver.cueing.mpc_workspace import FREE, tuned_axes
+from motionserver.cueing.mpc_workspace import tuned_axes
 from motionserver.cueing.reference import Reference, believable
 from motionserver.cueing.tuning import Tuning
-from motionserver.solvers.base import QpMatrices, QpVectors
+from motionserver.solvers.base import INFINITE, QpMatrices, QpVectors
 
 RATE_CORNER: Final = 0.5
 """High-pass of the wanted body rates [rad/s]: turning on and on cannot be followed."""
-LARGEST_DISTURBANCE: Final = 0.3
-"""Bound of the estimated output disturbance [m/s2]."""
 
 
 class SixAxis:
@@ -86,7 +85,7 @@ class SixAxis:
         self._cost = Cost(grid, self._rows.layout, tuning, self._period)
         self._backend = make_solver(tuning.backend, grid, self._cost, self._iterations)
         slacks = self._rows.layout.slacks
-        self._box = np.zeros(slacks), np.full(slacks, FREE)
+        self._box = np.zeros(slacks), np.full(slacks, INFINITE)
 
     def _make_reference(self, tuning: Tuning, nodes: Array) -> Reference:
         return Reference(tuning.reference, self._period, nodes, self._period, tuning.predictor)
@@ -176,8 +175,7 @@ class SixAxis:
         shown = replace(stimulus, rates=quick, preview=preview)
         wanted = self._reference.predict(shown, stimulus.rates)
         wanted[:, 3:] *= self._tuning.rotation_gain
-        bound = LARGEST_DISTURBANCE
-        wanted[:, :3] -= np.clip(np.nan_to_num(self.disturbance), -bound, bound)
+        wanted[:, :3] -= believed(self.disturbance)
         return wanted
 
     def _slow_ahead(self, times: Array, rates: Array) -> Array:

@@ -21,8 +21,9 @@ from motionserver.cueing.mpc_grid import SplineGrid
 from motionserver.cueing.mpc_legs import LegExtremes, NominalLegs
 from motionserver.cueing.mpc_nominal import Nominal
 from motionserver.cueing.mpc_outputs import Outputs
-from motionserver.cueing.mpc_workspace import FREE, WorkspaceRows
+from motionserver.cueing.mpc_workspace import WorkspaceRows
 from motionserver.cueing.thondel_legs import margins_over, way_home_gains, with_way_home
+from motionserver.solvers.base import INFINITE
 
 FIRST_LENGTH: Final = 0.03
 """Before this no length changes enough to matter [s]."""
@@ -68,7 +69,8 @@ class Rows:
         machine: Geometry and limits.
         grid: The grid of plans.
         period: Planner period [s].
-        box: Tuned position limits, (6,) [m, rad]; rows exist for those below the machine's.
+        box: Tuned position limits, (6,) [m, rad]; angles have rows, translations those
+            tuned below the machine's.
     """
 
     def __init__(self, machine: Machine, grid: SplineGrid, period: float, box: Array) -> None:
@@ -106,8 +108,8 @@ class Rows:
         for knot in range(len(knots)):
             rows = self._tilt.start + 4 * knot
             self.matrix[rows : rows + 4, 1 + knot] = -1.0
-        self._lower = np.full(self.count, -FREE)
-        self._upper = np.full(self.count, FREE)
+        self._lower = np.full(self.count, -INFINITE)
+        self._upper = np.full(self.count, INFINITE)
         self._half = 0.5 * (machine.leg_max - machine.leg_min)
         self._middle = 0.5 * (machine.leg_max + machine.leg_min)
         self._allowed = (1.0 - margins / self._half)[:, None]
@@ -183,7 +185,7 @@ class Rows:
 
     def _leave(self, rows: slice) -> None:
         self.matrix[rows, self.layout.slacks :] = 0.0
-        self._upper[rows] = FREE
+        self._upper[rows] = INFINITE
 
     def _near(
         self,

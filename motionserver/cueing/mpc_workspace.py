@@ -42,8 +42,6 @@ LOOK_EVERY: Final = 4
 """Periods from one look at a distant limit to the next."""
 KEPT: Final = 0.97
 """Share of a limit that a new plan may use."""
-FREE: Final = 1e20
-"""A bound that is none."""
 _STEP: Final = 1e-5
 
 Put = Callable[[slice, Array, Array, Array], None]

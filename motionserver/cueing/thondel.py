@@ -21,6 +21,7 @@ from motionserver.cueing.channels import CHANNELS, minus
 from motionserver.cueing.filters import filter_set
 from motionserver.cueing.halving import Halving, make_halving
 from motionserver.cueing.horizon import make_grid
+from motionserver.cueing.measured import believed
 from motionserver.cueing.reference import Reference, believable
 from motionserver.cueing.rotation import RotationPart
 from motionserver.cueing.stopping import STOP_TIME, with_stop
@@ -33,8 +34,6 @@ from motionserver.solvers.registry import make_backend
 
 YAW_CORNER: Final = 0.5
 """High-pass of the wanted yaw rate [rad/s]."""
-LARGEST_DISTURBANCE: Final = 0.3
-"""Bound of the estimated output disturbance [m/s2]."""
 SLACK_NOTICED: Final = 1e-4
 """Leg slack that counts as trouble [m]."""
 
@@ -190,9 +189,7 @@ class Thondel:
         height = self._machine.head[2]
         aim[0] -= -GRAVITY * turn[:, Axis.PITCH] + height * turn_acceleration[:, Axis.PITCH]
         aim[1] -= GRAVITY * turn[:, Axis.ROLL] - height * turn_acceleration[:, Axis.ROLL]
-        bound = LARGEST_DISTURBANCE
-        disturbance = np.clip(np.nan_to_num(self.disturbance), -bound, bound)
-        aim[:3] -= disturbance[:, None]
+        aim[:3] -= believed(self.disturbance)[:, None]
         return aim
 
     def _tell(self, state: Array, inputs: Array, result: QpResult, aim: Array) -> None:
