@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 GRAVITY: Final = 9.81
 """Standard gravity of every formula here [m/s2]."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from motionserver.core.axes import GRAVITY, Array
+from motionserver.core.kinematics.rotation import lever, transfer
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,12 +70,8 @@ def linearise(pose: Array, velocity: Array, acceleration: Array, arm: Array) -> 
         axis=1,
     )
     omega_dot = np.einsum("nij,nj->ni", rates_of, acceleration[:, 3:]) + drift
-    rx, ry, rz = arm
-    lever = np.array([[0.0, rz, -ry], [-rz, 0.0, rx], [ry, -rx, 0.0]])
-    along = omega @ arm
-    swing = omega_dot @ lever.T + omega * along[:, None] - arm * (omega**2).sum(1)[:, None]
     value = np.empty((count, 6))
-    value[:, :3] = plain + swing
+    value[:, :3] = transfer(plain, omega, omega_dot, arm)
     value[:, 2] -= GRAVITY
     value[:, 3:] = omega
 
@@ -92,5 +89,5 @@ def linearise(pose: Array, velocity: Array, acceleration: Array, arm: Array) -> 
     by_pose[:, 2, 2] = fx * vy - fy * vx
     by_acceleration = np.empty((count, 3, 6))
     by_acceleration[:, :, :3] = to_body
-    by_acceleration[:, :, 3:] = lever @ rates_of
+    by_acceleration[:, :, 3:] = lever(arm) @ rates_of
     return Outputs(value, by_pose, rates_of, by_acceleration)

@@ -11,6 +11,7 @@ zeros of its coefficients tell.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from motionserver.cueing.mpc_cost import JERK, Cost
 from motionserver.cueing.mpc_grid import SplineGrid, jerk_maps
 from motionserver.solvers.base import INFINITE, QpBackend, QpMatrices, QpResult, QpVectors
 from motionserver.solvers.registry import STAGED, make_backend, make_stage_backend
+from motionserver.solvers.screened import Screened
 from motionserver.solvers.stage import Stage, StageBackend, StageProgramme, make_stage
 
 JERK_UNIT: Final = 10.0
@@ -54,7 +56,7 @@ def make_solver(
     Raises:
         ValueError: There is no such backend, or its library is not there.
     """
-    dense = make_backend(name, iterations, TOLERANCE)
+    dense = Screened(partial(make_backend, name, iterations, TOLERANCE))
     if name not in STAGED:
         return dense
     return StagedProgramme(grid, cost, make_stage_backend(name, iterations), dense)

@@ -78,9 +78,9 @@ class QpBackend(Protocol):
     """A solver for one programme whose size stays fixed.
 
     ``solve`` may be called for ever after; matrices handed over once stay in force until others
-    are; the very same H handed over again is taken as unchanged. The last solution warm-starts the
-    next one where the method allows it. Numbers never raise: not finite, infeasible,
-    ill-conditioned ones come back as a status.
+    are; the very same H handed over again is taken as unchanged if nobody can write to it. The last
+    solution warm-starts the next one where the method allows it. Numbers never raise: not finite,
+    infeasible, ill-conditioned ones come back as a status.
 
     Every backend takes a fixed budget of iterations. What is left when it is used up differs: an
     interior-point iterate (piqp, hpipm) lies inside the inequalities once a full step has been

@@ -33,9 +33,12 @@ class Daqp(DenseBackend):
         self._set_h: Array | None = None
 
     def _keep(self, matrices: QpMatrices) -> QpMatrices:
-        # it takes no read-only arrays
-        kept = None if matrices.H is not self._last_h else self._matrices
+        # only what nobody can write to is surely what it was; it takes no read-only arrays itself
+        same = matrices.H is self._last_h and not matrices.H.flags.writeable
+        kept = self._matrices if same else None
         self._last_h = matrices.H
+        if not same:
+            self._set_h = None
         return QpMatrices(
             kept.H if kept is not None else np.require(matrices.H, np.float64, ["C", "W"]),
             np.require(matrices.A, np.float64, ["C", "W"]),

@@ -253,3 +253,15 @@ def test_a_budget_of_nothing_is_refused():
 def test_registry_is_complete():
     there = [name for name in BACKENDS if present(name)]
     assert {make_backend(name).name for name in there} == set(there) >= {"daqp", "osqp", "piqp"}
+
+
+@pytest.mark.parametrize("name", [name for name in BACKENDS if present(name)])
+def test_a_hessian_changed_in_place_is_a_new_one(name):
+    # the six-axis MPC fills one array again and again
+    vectors, matrices = programme(4)
+    backend = make_backend(name)
+    backend.solve(vectors, matrices)
+    matrices.H[:] = 3.0 * matrices.H + np.eye(len(matrices.H))
+    again = backend.solve(vectors, matrices)
+    fresh = make_backend(name).solve(vectors, matrices)
+    assert again.x == pytest.approx(fresh.x, abs=2e-3)

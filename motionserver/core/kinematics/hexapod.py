@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from motionserver.core.axes import Array, frozen
+from motionserver.core.axes import Array, Bools, frozen
 from motionserver.core.kinematics.rotation import (
     euler_rate_matrix,
     euler_rate_matrix_dot,
@@ -15,20 +16,33 @@ from motionserver.core.kinematics.rotation import (
 from motionserver.core.limits import Machine
 
 
-def leg_vectors(machine: Machine, poses: Array) -> tuple[Array, Array]:
-    """Vectors from base joint to platform joint, and the arms they act on.
+@dataclass(frozen=True, slots=True)
+class LegDirections:
+    """Where the legs point, in world axes.
 
-    Args:
-        machine: Geometry.
-        poses: (N, 6) [m, rad].
-
-    Returns:
-        Leg vectors (N, 6, 3) and arms R P_i (N, 6, 3), both in world axes [m].
+    Attributes:
+        unit: From base joint to platform joint, (N, 6, 3).
+        lengths: (N, 6) [m].
+        arms: R P_i, on which they act, (N, 6, 3) [m].
+        to_body: R', (N, 3, 3).
     """
-    arms = np.matmul(machine.platform_joints, np.swapaxes(rotation(poses[:, 3:]), -1, -2))
-    offset = poses[:, None, :3] - machine.base_joints
-    offset[..., 2] += machine.neutral_height
-    return arms + offset, arms
+
+    unit: Array
+    lengths: Array
+    arms: Array
+    to_body: Array
+
+
+def leg_directions(machine: Machine, poses: Array) -> LegDirections:
+    """Look at poses (N, 6) once, for all that can be asked about them."""
+    to_body = np.swapaxes(rotation(poses[:, 3:]), -1, -2)
+    arms = np.matmul(machine.platform_joints, to_body)
+    legs = poses[:, None, :3] - machine.base_joints
+    legs[..., 2] += machine.neutral_height
+    legs += arms
+    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
+    legs /= lengths[..., None]
+    return LegDirections(legs, lengths, arms, to_body)
 
 
 def leg_lengths(machine: Machine, poses: Array) -> Array:
@@ -53,16 +67,15 @@ def jacobian(machine: Machine, poses: Array) -> Array:
     Returns:
         J_E with l' = J_E q', (N, 6 legs, 6 axes).
     """
-    out = _jacobian(machine, poses)
+    out = _jacobian(leg_directions(machine, poses))
     out[..., 3:] = np.matmul(out[..., 3:], euler_rate_matrix(poses[:, 3:]))
     return out
 
 
-def _jacobian(machine: Machine, poses: Array) -> Array:
+def _jacobian(seen: LegDirections) -> Array:
     """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes, (N, 6, 6)."""
-    legs, arms = leg_vectors(machine, poses)
-    rows = np.empty((len(poses), 6, 6))
-    unit = legs / np.sqrt(np.einsum("nij,nij->ni", legs, legs))[..., None]
+    unit, arms = seen.unit, seen.arms
+    rows = np.empty((len(unit), 6, 6))
     rows[..., :3] = unit
     # written out: np.cross costs several times the arithmetic at these sizes
     rows[..., 3] = arms[..., 1] * unit[..., 2] - arms[..., 2] * unit[..., 1]
@@ -93,9 +106,8 @@ def leg_motion(
     omega_dot = np.einsum("nij,nj->ni", to_world, acceleration[:, 3:]) + np.einsum(
         "nij,nj->ni", euler_rate_matrix_dot(angles, angle_rates), angle_rates
     )
-    legs, arms = leg_vectors(machine, pose)
-    lengths = np.sqrt(np.einsum("nij,nij->ni", legs, legs))
-    unit = legs / lengths[..., None]
+    seen = leg_directions(machine, pose)
+    lengths, unit, arms = seen.lengths, seen.unit, seen.arms
     spin = omega[:, None, :]
     motion = velocity[:, None, :3] + np.cross(spin, arms)
     second = (
@@ -111,52 +123,66 @@ def leg_motion(
     return lengths, speeds, accelerations
 
 
-def joint_angles(machine: Machine, poses: Array) -> Array:
+def joint_angles(machine: Machine, poses: Array, seen: LegDirections | None = None) -> Array:
     """Swing of each leg's two joints about the neutral leg direction, (N, 2, 6) [rad].
 
-    Index 0 is the base end, 1 the platform end.
+    Index 0 is the base end, 1 the platform end. ``seen``: the poses' `leg_directions`, if known.
     """
     axis = _neutral_directions(machine)
-    legs, _ = leg_vectors(machine, poses)
-    unit = legs / np.sqrt(np.einsum("nij,nij->ni", legs, legs))[..., None]
-    carried = np.matmul(axis, np.swapaxes(rotation(poses[:, 3:]), -1, -2))
-    cosines = np.stack(
-        (np.einsum("nij,ij->ni", unit, axis), np.einsum("nij,nij->ni", unit, carried)), 1
-    )
+    seen = seen or leg_directions(machine, poses)
+    carried = np.matmul(axis, seen.to_body)
+    cosines = np.empty((len(poses), 2, 6))
+    np.einsum("nij,ij->ni", seen.unit, axis, out=cosines[:, 0])
+    np.einsum("nij,nij->ni", seen.unit, carried, out=cosines[:, 1])
     swing: Array = np.arccos(np.clip(cosines, -1.0, 1.0))
     return swing
 
 
 def conditioning(machine: Machine, poses: Array) -> Array:
     """Smallest singular value of the twist Jacobian, angles scaled by the platform radius, (N,)."""
-    rows = _scaled_jacobian(machine, poses)
+    rows = _scaled_jacobian(machine, leg_directions(machine, poses))
     smallest = np.linalg.svd(rows, compute_uv=False)[:, -1]
     return smallest.astype(np.float64, copy=False)
 
 
-def is_conditioned(machine: Machine, poses: Array, least: float) -> bool:
+def is_conditioned(
+    machine: Machine, poses: Array, least: float, seen: LegDirections | None = None
+) -> bool:
     """True if `conditioning` is at least ``least`` at all poses (N, 6); cheaper than its values.
+
+    ``seen``: the poses' `leg_directions`, if known.
+    """
+    doubtful = ~surely_conditioned(machine, poses, least, seen)
+    return not doubtful.any() or bool(conditioning(machine, poses[doubtful]).min() >= least)
+
+
+def surely_conditioned(
+    machine: Machine, poses: Array, least: float, seen: LegDirections | None = None
+) -> Bools:
+    """True where a bound tells already that `conditioning` is at least ``least``, (N,).
 
     1 / |J^-1| in the Frobenius norm never exceeds the smallest singular value, so the costly
     decomposition is needed for those poses only whose bound is too small.
     """
-    rows = _scaled_jacobian(machine, poses)
+    rows = _scaled_jacobian(machine, seen or leg_directions(machine, poses))
     try:
         inverse = np.linalg.inv(rows)
     except np.linalg.LinAlgError:
-        return False
-    doubtful = np.einsum("nij,nij->n", inverse, inverse) * least**2 > 1.0
-    if not doubtful.any():
-        return True
-    values = np.linalg.svd(rows[doubtful], compute_uv=False)[:, -1]
-    return bool(values.min() >= least)
+        return np.zeros(len(poses), dtype=bool)
+    sure: Bools = np.einsum("nij,nij->n", inverse, inverse) * least**2 <= 1.0
+    return sure
 
 
-def _scaled_jacobian(machine: Machine, poses: Array) -> Array:
-    radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
-    rows = _jacobian(machine, poses)
-    rows[..., 3:] /= radius
+def _scaled_jacobian(machine: Machine, seen: LegDirections) -> Array:
+    rows = _jacobian(seen)
+    rows[..., 3:] /= _platform_radius(machine)
     return rows
+
+
+@lru_cache(maxsize=16)
+def _platform_radius(machine: Machine) -> float:
+    """Mean distance of the platform joints from the reference point's axis [m]."""
+    return float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
 
 
 @lru_cache(maxsize=16)
@@ -173,5 +199,4 @@ def neutral_conditioning(machine: Machine) -> float:
 
 @lru_cache(maxsize=16)
 def _neutral_directions(machine: Machine) -> Array:
-    legs, _ = leg_vectors(machine, np.zeros((1, 6)))
-    return frozen(legs[0] / np.linalg.norm(legs[0], axis=-1, keepdims=True))
+    return frozen(leg_directions(machine, np.zeros((1, 6))).unit[0])

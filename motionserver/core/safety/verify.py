@@ -13,6 +13,7 @@ from motionserver.core.kinematics.hexapod import (
     conditioning,
     is_conditioned,
     joint_angles,
+    leg_directions,
     leg_lengths,
     neutral_conditioning,
 )
@@ -147,8 +148,10 @@ def _check_posture(
 ) -> Rejection | None:
     """Joint angles and conditioning at some of the poses (N, 6), the last one included."""
     rows = np.append(np.arange(0, len(poses), every), len(poses) - 1)
+    poses = poses[rows]
+    seen = leg_directions(machine, poses)
     if machine.joint_angle is not None:
-        swing = joint_angles(machine, poses[rows])
+        swing = joint_angles(machine, poses, seen)
         largest, allowed = float(swing.max()), machine.joint_angle - margins.swing
         if largest > allowed:
             row, _, leg = np.unravel_index(int(swing.argmax()), swing.shape)
@@ -156,8 +159,8 @@ def _check_posture(
             return Rejection(Reason.JOINT_ANGLE, when, int(leg), largest, allowed)
     if machine.conditioning is not None:
         allowed = machine.conditioning * neutral_conditioning(machine) * margins.conditioning
-        if not is_conditioned(machine, poses[rows], allowed):
-            found = conditioning(machine, poses[rows])
+        if not is_conditioned(machine, poses, allowed, seen):
+            found = conditioning(machine, poses)
             when = at(int(rows[found.argmin()]))
             return Rejection(Reason.CONDITIONING, when, None, float(found.min()), allowed)
     return None

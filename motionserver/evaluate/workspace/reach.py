@@ -7,21 +7,18 @@ from enum import StrEnum
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from motionserver.core.axes import Array
+from motionserver.core.axes import Array, Bools
 from motionserver.core.kinematics.hexapod import (
     conditioning,
     jacobian,
     joint_angles,
     leg_lengths,
-    leg_vectors,
     neutral_conditioning,
+    surely_conditioned,
 )
 from motionserver.core.kinematics.rotation import rotation
 from motionserver.core.limits import Machine
-
-Bools = NDArray[np.bool_]
 
 STEPS: Final = 64
 """Samples along a way while its fastest leg, at neutral's slope, uses up the whole stroke."""
@@ -99,27 +96,10 @@ def posture_allowed(machine: Machine, poses: Array) -> Bools:
     if machine.conditioning is not None:
         rows = np.flatnonzero(allowed)
         least = machine.conditioning * neutral_conditioning(machine)
-        rows = rows[~_surely_conditioned(machine, poses[rows], least)]
+        rows = rows[~surely_conditioned(machine, poses[rows], least)]
         if len(rows):
             allowed[rows] = conditioning(machine, poses[rows]) >= least
     return allowed
-
-
-def _surely_conditioned(machine: Machine, poses: Array, least: float) -> Bools:
-    """True where 1 / |J^-1| (Frobenius), never above the smallest singular value, is enough.
-
-    Spares nearly all poses the decomposition, which costs several times as much.
-    """
-    legs, arms = leg_vectors(machine, poses)
-    unit = legs / np.linalg.norm(legs, axis=-1, keepdims=True)
-    radius = float(np.mean(np.hypot(*machine.platform_joints[:, :2].T)))
-    rows = np.concatenate((unit, np.cross(arms, unit) / radius), axis=-1)
-    try:
-        inverse = np.linalg.inv(rows)
-    except np.linalg.LinAlgError:
-        return np.zeros(len(poses), dtype=bool)
-    sure: Bools = np.einsum("nij,nij->n", inverse, inverse) * least**2 < 1.0
-    return sure
 
 
 def first_exits(machine: Machine, directions: Array, arm: Array | None = None) -> Exits:

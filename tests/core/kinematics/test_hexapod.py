@@ -15,9 +15,9 @@ from motionserver.core.kinematics.hexapod import (
     conditioning,
     jacobian,
     joint_angles,
+    leg_directions,
     leg_lengths,
     leg_motion,
-    leg_vectors,
     neutral_conditioning,
 )
 
@@ -158,12 +158,11 @@ def test_joints_swing_by_what_the_platform_turns():
     swing = joint_angles(machine, np.stack((np.zeros(6), pose)))
     assert swing.shape == (2, 2, 6)
     assert swing[0].max() < 1e-7
-    legs, _ = leg_vectors(machine, pose[None])
-    level, _ = leg_vectors(machine, np.zeros((1, 6)))
+    legs = leg_directions(machine, pose[None]).unit
+    level = leg_directions(machine, np.zeros((1, 6))).unit
     turn = Rotation.from_euler("ZYX", pose[[5, 4, 3]])
     for leg in range(6):
-        unit = legs[0, leg] / np.linalg.norm(legs[0, leg])
-        axis = level[0, leg] / np.linalg.norm(level[0, leg])
+        unit, axis = legs[0, leg], level[0, leg]
         assert swing[1, 0, leg] == pytest.approx(np.arccos(unit @ axis), abs=1e-9)
         assert swing[1, 1, leg] == pytest.approx(np.arccos(unit @ turn.apply(axis)), abs=1e-9)
 
