@@ -92,7 +92,11 @@ def test_trouble_costs_little(algorithm, reference):
 STARVING = Disturbance(seed=2, stalled=0.05, stall=0.05, failed=0.5, nan=0.01)
 
 
-@pytest.mark.parametrize("backend", ["piqp", "osqp", "hpipm"])
+# an active set cut short has nothing to show: it keeps its own budget
+BUDGETS = {"daqp": None, "piqp": 1, "osqp": 1, "hpipm": 1}
+
+
+@pytest.mark.parametrize("backend", BUDGETS)
 @pytest.mark.parametrize("name", ["truck_brake_accel", "truck_rough_road"])
 def test_starved_it_still_moves_and_stays_inside(name, backend):
     """One iteration where the method allows it, stalls, and half of the solves failing."""
@@ -102,7 +106,11 @@ def test_starved_it_still_moves_and_stays_inside(name, backend):
     period = 0.01
     homes = MACHINE.parked_pose[None]
     thinker = Thinker(
-        MACHINE, tuning, period, homes, SixAxis(MACHINE, tuning, period, iterations=1)
+        MACHINE,
+        tuning,
+        period,
+        homes,
+        SixAxis(MACHINE, tuning, period, iterations=BUDGETS[backend]),
     )
     driven = drive(MACHINE, recorded(name), tuning, thinker=thinker, disturbance=STARVING)
     kappa = driven.periods.kappa
