@@ -51,6 +51,15 @@ def evaluate(
         Path | None,
         typer.Option("--compare", help="all recordings of a folder", metavar="FOLDER"),
     ] = None,
+    held_out: Annotated[
+        Path | None,
+        typer.Option(
+            "--held-out",
+            help="result.json of tune; --compare then drives each recording with the tunables "
+            "chosen without it",
+            metavar="RESULT.json",
+        ),
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", help="of --compare (resumes) and omct", metavar="DIR")
     ] = Path("out/evaluate"),
@@ -64,7 +73,10 @@ def evaluate(
         bool, typer.Option("--predictions", help="only how well reference models foretell it")
     ] = False,
     setpoints: Annotated[
-        Path | None, typer.Option("--setpoints", help="write executed samples", metavar="OUT.csv")
+        Path | None,
+        typer.Option(
+            "--setpoints", help="write executed samples of the only --algorithm", metavar="OUT.csv"
+        ),
     ] = None,
     json_out: Annotated[
         Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
@@ -92,6 +104,7 @@ def evaluate(
         disturb,
         seed,
         jobs,
+        held_out,
         setpoints,
         json_out,
         html_out,

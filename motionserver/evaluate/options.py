@@ -45,6 +45,8 @@ class EvaluateOptions:
         disturb: Whether planners are troubled.
         seed: Of the trouble.
         jobs: Processes at the same time.
+        held_out: A ``result.json`` of ``tune``, or None: with --compare each recording is driven
+            with the tunables that were chosen without it.
         setpoints: File for set-points, or None.
         json_out: File for figures, or None.
         html_out: File for the page, or None.
@@ -63,6 +65,7 @@ class EvaluateOptions:
     disturb: bool = False
     seed: int = 0
     jobs: int = 2
+    held_out: Path | None = None
     setpoints: Path | None = None
     json_out: Path | None = None
     html_out: Path | None = None

@@ -5,18 +5,20 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from own_hexapod import RECORDINGS
 
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
-from motionserver.evaluate.compare import run
+from motionserver.evaluate.compare import command, run
 from motionserver.evaluate.compare.command import compare
 from motionserver.evaluate.compare.contenders import Task, contenders
 from motionserver.evaluate.compare.table import COLUMNS, RATIO, Block, Line, blocks
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.options import EvaluateOptions
 from motionserver.settings.machine import load_machine
+from motionserver.settings.tuning import default_for
 
 MACHINE = load_machine("t2-compact")
 OPTIONS = EvaluateOptions("classical", rate=250.0, jobs=1, disturb=True, seed=3)
@@ -118,6 +120,41 @@ def test_ways_of_an_algorithm_that_predicts():
         "thondel2014 (constant)",
         "thondel2014 (told 4 s ahead)",
     ]
+
+
+def test_held_out_each_recording_has_the_tunables_chosen_without_it(folder, tmp_path, monkeypatch):
+    chosen = {
+        "truck_brake_accel": {"gain": 0.4},
+        "truck_roundabout": {"gain": 0.9},
+    }
+    result = tmp_path / "result.json"
+    folds = {name: {"trial": 1, "values": values} for name, values in chosen.items()}
+    base = default_for(MACHINE).model_dump()
+    result.write_text(json.dumps({"schema": "motionserver-tuning-1", "base": base, "folds": folds}))
+    seen = []
+    monkeypatch.setattr(
+        command, "run_tasks", lambda tasks, *_: seen.extend(tasks) or [None] * len(tasks)
+    )
+    with pytest.raises(ConfigError, match="every drive failed"):
+        compare(folder, tmp_path, replace(OPTIONS, held_out=result, tilt_rate="6"))
+    gains = {
+        (task.recording.stem, task.contender.label): task.contender.tuning.gain
+        for task in seen
+        if task.contender.way
+    }
+    assert gains == {
+        ("truck_brake_accel", "classical (tuned on the others)"): 0.4,
+        ("truck_roundabout", "classical (tuned on the others)"): 0.9,
+    }
+    assert {task.contender.tuning.tilt_rate for task in seen} == {np.radians(6.0)}
+    # rivals are what they are without
+    plain = contenders(["classical"], replace(Tuning(), tilt_rate=np.radians(6.0)), 2.0, None)
+    assert seen[1].contender.tuning.gain == plain[1].tuning.gain
+
+    del folds["truck_roundabout"]
+    result.write_text(json.dumps({"schema": "motionserver-tuning-1", "base": base, "folds": folds}))
+    with pytest.raises(ConfigError, match="without truck_roundabout"):
+        compare(folder, tmp_path, replace(OPTIONS, held_out=result))
 
 
 def test_the_key_knows_what_matters():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from math import degrees
 from pathlib import Path
 from typing import Any, Final
@@ -19,6 +20,7 @@ from motionserver.evaluate.compare.run import Result, run_tasks
 from motionserver.evaluate.compare.table import COLUMNS, Block, blocks, to_text
 from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.options import EvaluateOptions
+from motionserver.evaluate.tune.preset import read_fold_tunings
 from motionserver.evaluate.yardstick import RULE
 
 SCHEMA: Final = "motionserver-comparison-1"
@@ -55,12 +57,14 @@ def compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
             )
     machine, tuning = options.machine(), options.tuning()
     preview = options.preview or UPPER_BOUND
-    entered = contenders(names, tuning, preview, options.disturbance())
+    folds = _folds(options.held_out, [recording.stem for recording in recordings], tuning)
+    trouble = options.disturbance()
     tasks = [
         Task(recording, contender, machine, options.rate, options.planner_hz)
         for recording in recordings
-        for contender in entered
+        for contender in contenders(names, tuning, preview, trouble, folds.get(recording.stem))
     ]
+    entered = [task.contender for task in tasks if task.recording == recordings[0]]
 
     def tell(text: str) -> None:
         print(f"compare: {text}", file=sys.stderr, flush=True)  # noqa: T201
@@ -76,7 +80,7 @@ def compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
         raise ConfigError("--compare", "every drive failed", "Read the lines above.")
     found = blocks(known)
     facts = _facts(machine, tuning, options)
-    footer = _footer(entered, known, failed)
+    footer = _footer(entered, known, failed, options.held_out)
     text = to_text(found, [facts, "", *_columns(), "", *footer])
     (out / "compare.txt").write_text(text, encoding="utf-8")
     mapping = _mapping(machine, tuning, options, entered, known, failed, found)
@@ -103,8 +107,33 @@ def _columns() -> list[str]:
     return [f"{column.head}: {column.meaning}" for column in COLUMNS]
 
 
-def _footer(entered: list[Contender], known: list[Result], failed: list[str]) -> list[str]:
+def _folds(path: Path | None, names: list[str], tuning: Tuning) -> dict[str, Tuning]:
+    """For each recording the tunables chosen without it, for the limits of this comparison."""
+    if path is None:
+        return {}
+    folds = read_fold_tunings(path)
+    missing = [name for name in names if name not in folds]
+    if missing:
+        raise ConfigError(
+            f"--held-out {path}",
+            f"holds no tunables chosen without {', '.join(missing)}",
+            "Tune on these recordings as well.",
+        )
+    return {
+        name: replace(fold, scale=tuning.scale, tilt_rate=tuning.tilt_rate, box=tuning.box)
+        for name, fold in folds.items()
+    }
+
+
+def _footer(
+    entered: list[Contender], known: list[Result], failed: list[str], held_out: Path | None
+) -> list[str]:
     out = [f"yardstick: {RULE}.", f"hindsight: {HINDSIGHT_RULE}."]
+    if held_out is not None:
+        out.append(
+            "tuned on the others: on each recording the tunables that 'motionserver tune' chose "
+            f"without it, from {held_out.name}; also where it is told ahead."
+        )
     told = next((c.preview for c in entered if c.way == "preview"), None)
     if told is not None:
         out.append(

@@ -43,7 +43,7 @@ class Contender:
 
     Attributes:
         name: Algorithm or rival.
-        way: "default", "constant", "preview"; empty for a rival.
+        way: "default", "constant", "preview", "held out"; empty for a rival.
         tuning: Tunables.
         preview: How far the recording is told ahead [s].
         disturbance: Trouble; none if None.
@@ -62,6 +62,8 @@ class Contender:
             return f"{self.name} ({self.tuning.reference})"
         if self.way == "preview":
             return f"{self.name} (told {self.preview:g} s ahead)"
+        if self.way == "held out":
+            return f"{self.name} (tuned on the others)"
         return f"{self.name} (constant)" if self.way == "constant" else self.name
 
 
@@ -100,20 +102,33 @@ class Task:
 
 
 def contenders(
-    algorithms: list[str], tuning: Tuning, preview: float, disturbance: Disturbance | None
+    algorithms: list[str],
+    tuning: Tuning,
+    preview: float,
+    disturbance: Disturbance | None,
+    held_out: Tuning | None = None,
 ) -> list[Contender]:
     """All lines of the table: each algorithm in each of its ways, then the rivals.
 
     A way that is no other than the default (its reference is the constant one already) is left
     out.
+
+    Args:
+        algorithms: Their names.
+        tuning: Tunables of all.
+        preview: How far the recording is told ahead in that way [s].
+        disturbance: Trouble for the algorithms; none if None.
+        held_out: The algorithms' tunables on this recording, chosen on others, in place of
+            ``tuning``.
     """
     out = []
     for name in algorithms:
-        own = replace(tuning, algorithm=name)
-        out.append(Contender(name, "default", own, 0.0, disturbance))
+        own = replace(held_out or tuning, algorithm=name)
+        way = "default" if held_out is None else "held out"
+        out.append(Contender(name, way, own, 0.0, disturbance))
         if name in _WITHOUT_REFERENCE:
             continue
-        if tuning.reference != "constant":
+        if held_out is None and tuning.reference != "constant":
             constant = replace(own, reference="constant")
             out.append(Contender(name, "constant", constant, 0.0, disturbance))
         out.append(Contender(name, "preview", own, preview, disturbance))
