@@ -90,6 +90,24 @@ def test_the_spare_takes_over_from_a_killed_guard(tmp_path: Path) -> None:
     assert jump_after_takeover(tmp_path / "base.log") < 1e-3
 
 
+def test_a_frozen_guard_is_killed_and_the_spare_parks(tmp_path: Path) -> None:
+    with Rig(tmp_path) as rig:
+        rig.run()
+        old, spare = rig.pid("guard"), rig.pid("spare")
+        assert old is not None
+        os.kill(old, signal.SIGSTOP)
+        rig.wait_for(lambda: not is_alive(old), "the frozen guard to be killed")
+        rig.wait_for(lambda: rig.shown().get("pid") == spare, "the spare's word")
+        rig.wait_state("PARKED")
+        assert "does not answer; killed" in rig.text()
+        replaced(rig, "spare", old)
+        assert rig.end() == 0
+        verdict = rig.verdict()
+    assert_soft(verdict)
+    assert verdict["is_parked"]
+    assert jump_after_takeover(tmp_path / "base.log") < 1e-3
+
+
 def test_a_killed_supervisor_leaves_a_guard_that_parks_and_ends(tmp_path: Path) -> None:
     with Rig(tmp_path, web=True) as rig:
         rig.run()
