@@ -38,9 +38,9 @@ def test_the_programme_solved_is_the_one_just_filled(backend, share):
         mpc._backend = taps[0]
         return mpc
 
-    time_plans(MACHINE, tuning, 60, paced=False, make=make, begin=LIVELY)
+    time_plans(MACHINE, tuning, 70, paced=False, make=make, begin=LIVELY + 80)
     errors = np.array(taps[0].errors)
-    assert len(errors) == 60
+    assert len(errors) == 70
     # something happens: else stale matrices would do as well
     assert errors[:, 1].max() > 0.05
     assert errors[:, 0].max() < share
