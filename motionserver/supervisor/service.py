@@ -16,7 +16,7 @@ from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
 from motionserver.supervisor.addresses import open_link, try_addresses
 from motionserver.supervisor.child import Child
-from motionserver.supervisor.pulse import POLL, Pulse
+from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
 from motionserver.telemetry.ticker import now_ns
@@ -187,8 +187,10 @@ class Service:
             active, _ = self._active()
             message = self._maps.clock.read()
             written = 0 if message is None else GuardClock.unpack(message[1]).written_ns
-            if pulse.look(loop.time(), active.pid, written):
-                log.error("%s does not answer; killed, the spare takes over", active.name)
+            pid = active.pid
+            runnable = pid is not None and is_runnable(pid)
+            if pulse.look(loop.time(), pid, written, runnable):
+                log.error("%s stands still; killed, the spare takes over", active.name)
                 active.signal(signal.SIGKILL)
             await asyncio.sleep(POLL)
 

@@ -1,10 +1,16 @@
 """Frozen or merely unlucky: looks at the guard's clock on virtual time."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionserver.supervisor.pulse import FROZEN, POLL, Pulse
+from motionserver.supervisor.pulse import FROZEN, POLL, STARVED, Pulse, is_runnable
 
 
 def looks(pulse, times, written, pid=7):
@@ -46,5 +52,23 @@ def test_a_guard_that_has_not_written_or_is_gone_is_not_judged():
 
 def test_another_guard_begins_anew():
     pulse = Pulse()
-    assert not any(looks(pulse, every(POLL, 9), 5))
-    assert not any(looks(pulse, every(POLL, 9, 100.0 + 9 * POLL), 5, 8))
+    few = int(FROZEN / POLL) - 1
+    assert not any(looks(pulse, every(POLL, few), 5))
+    assert not any(looks(pulse, every(POLL, few, 100.0 + few * POLL), 5, 8))
+
+
+def test_one_that_waits_for_the_processor_is_given_more_time():
+    pulse = Pulse()
+    found = [pulse.look(now, 7, 5, runnable=True) for now in every(POLL, 60)]
+    assert STARVED <= found.index(True) * POLL <= STARVED + 2 * POLL
+
+
+def test_the_kernel_tells_running_sleeping_and_stopped_apart():
+    assert is_runnable(os.getpid())
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as asleep:
+        while is_runnable(asleep.pid):
+            time.sleep(0.01)
+        asleep.send_signal(signal.SIGSTOP)
+        assert not is_runnable(asleep.pid)
+        asleep.kill()
+    assert not is_runnable(asleep.pid)
