@@ -173,6 +173,11 @@ class Service:
         message = self._maps.clock.read()
         return message is None or STATES[GuardClock.unpack(message[1]).state] not in CUED
 
+    @property
+    def active_guard(self) -> Child:
+        """The guard that moves the platform."""
+        return self._active()[0]
+
     def _active(self) -> tuple[Child, Child]:
         """The guard that holds the lock, by its own word, and the other."""
         message = self._maps.guard.read()
