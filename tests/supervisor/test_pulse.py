@@ -65,10 +65,14 @@ def test_one_that_waits_for_the_processor_is_given_more_time():
 
 def test_the_kernel_tells_running_sleeping_and_stopped_apart():
     assert is_runnable(os.getpid())
-    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as asleep:
-        while is_runnable(asleep.pid):
-            time.sleep(0.01)
-        asleep.send_signal(signal.SIGSTOP)
-        assert not is_runnable(asleep.pid)
+    asleep = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    try:
+        for number in (signal.SIGCONT, signal.SIGSTOP):
+            asleep.send_signal(number)
+            # it wakes for the signal: runnable for a moment
+            while is_runnable(asleep.pid):
+                time.sleep(0.01)
+    finally:
         asleep.kill()
+        asleep.wait()
     assert not is_runnable(asleep.pid)
