@@ -38,12 +38,14 @@ class Address:
     """One address the server binds.
 
     Attributes:
+        name: What it is for.
         key: Where it stands in the configuration.
         protocol: "udp" or "tcp".
         host: Own address.
         port: Own port; 0 is any.
     """
 
+    name: str
     key: str
     protocol: str
     host: str
@@ -114,7 +116,7 @@ def own_address(tried: Tried, runs: bool) -> Finding:
         runs: Whether a server has the platform's address already.
     """
     address = tried.address
-    name = f"address {address.key}"
+    name = address.name
     cannot = "the server will not start"
     if not tried.error:
         return Finding(name, Level.OK, f"{address} free", "the server can have it")

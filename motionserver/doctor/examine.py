@@ -122,16 +122,16 @@ def configuration_findings(config: Config, path: Path, tree: Tree) -> list[Findi
         out.append(way.platform_way(tree, found))
     if web.enabled:
         tokens = Path(web.tokens_file or state_dir_of(config) / "tokens.json")
-        out.append(keyfiles.token_file(keyfiles.look_at_file("[web] tokens_file", tokens)))
+        out.append(keyfiles.token_file(keyfiles.look_at_file("page's tokens", tokens)))
         if web.tls_key:
-            key = keyfiles.look_at_file("[web] tls_key", Path(web.tls_key))
+            key = keyfiles.look_at_file("page's TLS key", Path(web.tls_key))
             out.append(keyfiles.secret_file(key))
     for source in config.sources:
         if source.key_file:
-            where = f"[[sources]] {source.kind} {source.listen} key_file"
-            out.append(keyfiles.secret_file(keyfiles.look_at_file(where, Path(source.key_file))))
+            file = keyfiles.look_at_file(f"{source.kind} key", Path(source.key_file))
+            out.append(keyfiles.secret_file(file))
     if switch := config.operator.enable_input:
-        file = keyfiles.look_at_file("[operator] enable_input", Path(switch))
+        file = keyfiles.look_at_file("enable switch", Path(switch))
         out.append(keyfiles.enable_switch(file))
     return out
 
@@ -156,15 +156,20 @@ def wanted_addresses(config: Config) -> list[addresses.Address]:
     platform, web = config.platform, config.web
     out = [
         addresses.Address(
-            "[platform] local_host, local_port", "udp", platform.local_host, platform.local_port
+            "platform's address",
+            "[platform] local_host, local_port",
+            "udp",
+            platform.local_host,
+            platform.local_port,
         )
     ]
     for source in config.sources:
         host, port = split_address(source.listen)
         protocol = "tcp" if source.kind == "zenoh" else "udp"
-        out.append(
-            addresses.Address(f"[[sources]] {source.kind} {source.listen}", protocol, host, port)
-        )
+        key = f"[[sources]] {source.kind} listen"
+        out.append(addresses.Address(f"{source.kind} source", key, protocol, host, port))
     if web.enabled:
-        out.append(addresses.Address("[web] host, port", "tcp", web.host, web.port))
+        out.append(
+            addresses.Address("page's address", "[web] host, port", "tcp", web.host, web.port)
+        )
     return out

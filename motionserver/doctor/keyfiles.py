@@ -15,35 +15,35 @@ class KeyFile:
     """What is known of such a file.
 
     Attributes:
-        key: Where it stands in the configuration.
+        name: What it is for.
         path: Where it is.
         mode: Its permission bits; None if it is not there.
         readable: Whether this user may read it.
         hidden: Whether this user may not even look.
     """
 
-    key: str
+    name: str
     path: Path
     mode: int | None
     readable: bool
     hidden: bool = False
 
 
-def look_at_file(key: str, path: Path) -> KeyFile:
+def look_at_file(name: str, path: Path) -> KeyFile:
     """Read a file's permissions, never its content."""
     path = path.expanduser()
     try:
         mode = stat.S_IMODE(path.stat().st_mode)
     except PermissionError:
-        return KeyFile(key, path, None, False, True)
+        return KeyFile(name, path, None, False, True)
     except OSError:
-        return KeyFile(key, path, None, False)
-    return KeyFile(key, path, mode, os.access(path, os.R_OK))
+        return KeyFile(name, path, None, False)
+    return KeyFile(name, path, mode, os.access(path, os.R_OK))
 
 
 def token_file(file: KeyFile) -> Finding:
     """The page's tokens: others must not read them, or the page does not start."""
-    name = f"file {file.key}"
+    name = file.name
     if file.mode is None and not file.hidden:
         return Finding(name, Level.OK, f"{file.path}: not there yet", "made at the first start")
     bad = _unreadable(name, file, "the page does not start")
@@ -60,7 +60,7 @@ def token_file(file: KeyFile) -> Finding:
 
 def secret_file(file: KeyFile) -> Finding:
     """A key of signed packets or of the page's certificate."""
-    name = f"file {file.key}"
+    name = file.name
     bad = _unreadable(name, file, "the server will not start")
     if bad is not None:
         return bad
@@ -76,7 +76,7 @@ def secret_file(file: KeyFile) -> Finding:
 
 def enable_switch(file: KeyFile) -> Finding:
     """The file of the enable switch: unreadable counts as released."""
-    name = f"file {file.key}"
+    name = file.name
     bad = _unreadable(name, file, "counts as released: nobody can engage from the page")
     if bad is not None:
         return bad

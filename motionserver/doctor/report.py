@@ -15,6 +15,7 @@ FORMAT: Final = 1
 """Of the JSON; a change that breaks a reader raises it."""
 WIDTH: Final = 100
 _NAMES: Final = 23
+_BELOW: Final = " " * 9
 _INDENT: Final = " " * (9 + _NAMES + 1)
 
 
@@ -77,8 +78,8 @@ def _lines_of(finding: Finding) -> list[str]:
         break_on_hyphens=False,
     )
     if finding.level is not Level.OK:
-        lines.append(f"{_INDENT}means: {finding.means}")
+        lines.append(f"{_BELOW}means: {finding.means}")
     if finding.mend:
         # unbroken: it is there to be copied
-        lines.append(f"{_INDENT}mend:  {finding.mend}")
+        lines.append(f"{_BELOW}mend:  {finding.mend}")
     return lines

@@ -117,7 +117,7 @@ def promise(sleep: Sleep) -> str:
     if level is not Level.OK:
         return text
     more = [rate for rate in LADDER if rate > sleep.rate_hz and sleep.level_at(rate) is Level.OK]
-    return f"{text}; wake-ups this punctual would do for {more[-1]:g} Hz" if more else text
+    return f"{text}; by wake-ups alone {more[-1]:g} Hz too" if more else text
 
 
 def wake_up_lateness(sleep: Sleep) -> Finding:

@@ -91,7 +91,7 @@ def platform_way(tree: Tree, way: Way) -> Finding:
     if way.error == errno.EADDRNOTAVAIL:
         return Finding(
             name, Level.UNKNOWN, f"{way.local} is no address of this computer",
-            "see address [platform] local_host, local_port", look,
+            "see the platform's address", look,
         )  # fmt: skip
     if way.error:
         reason = os.strerror(way.error) if way.error > 0 else "no reason given"
