@@ -154,22 +154,15 @@ def configuration(config: Config, path: Path) -> Finding:
 def wanted_addresses(config: Config) -> list[addresses.Address]:
     """Every address the server will bind, the platform's first."""
     platform, web = config.platform, config.web
-    out = [
-        addresses.Address(
-            "platform's address",
-            "[platform] local_host, local_port",
-            "udp",
-            platform.local_host,
-            platform.local_port,
-        )
-    ]
+    key = "[platform] local_host, local_port"
+    host, port = platform.local_host, platform.local_port
+    out = [addresses.Address("platform's address", key, "udp", host, port)]
     for source in config.sources:
+        key = f"[[sources]] {source.kind} listen"
         host, port = split_address(source.listen)
         protocol = "tcp" if source.kind == "zenoh" else "udp"
-        key = f"[[sources]] {source.kind} listen"
         out.append(addresses.Address(f"{source.kind} source", key, protocol, host, port))
     if web.enabled:
-        out.append(
-            addresses.Address("page's address", "[web] host, port", "tcp", web.host, web.port)
-        )
+        key = "[web] host, port"
+        out.append(addresses.Address("page's address", key, "tcp", web.host, web.port))
     return out
