@@ -128,7 +128,7 @@ def configuration_findings(config: Config, path: Path, tree: Tree) -> list[Findi
             out.append(keyfiles.secret_file(key))
     for source in config.sources:
         if source.key_file:
-            file = keyfiles.look_at_file(f"{source.kind} key", Path(source.key_file))
+            file = keyfiles.look_at_file(f"{source.kind} key", Path(source.key_file).expanduser())
             out.append(keyfiles.secret_file(file))
     if switch := config.operator.enable_input:
         file = keyfiles.look_at_file("enable switch", Path(switch))

@@ -31,7 +31,6 @@ class KeyFile:
 
 def look_at_file(name: str, path: Path) -> KeyFile:
     """Read a file's permissions, never its content."""
-    path = path.expanduser()
     try:
         mode = stat.S_IMODE(path.stat().st_mode)
     except PermissionError:

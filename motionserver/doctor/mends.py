@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 REALTIME_USER: Final = (
-    "printf '@motionserver - rtprio 60\\n@motionserver - nice -10\\n' | "
-    "sudo tee /etc/security/limits.d/motionserver.conf; "
-    'sudo usermod -aG motionserver "$USER"'
+    'printf "$USER - rtprio 60\\n$USER - nice -10\\n" | '
+    "sudo tee -a /etc/security/limits.d/motionserver.conf"
 )
 """Then log in again."""
 REALTIME_SOFT: Final = "ulimit -r 60"

@@ -63,7 +63,7 @@ def scheduling_class(tree: Tree, granted: str | None, realtime: bool) -> Finding
     nice = granted is not None and granted.startswith("nice")
     return Finding(
         name, Level.ADVICE if nice else Level.WARNING,
-        f"SCHED_FIFO refused, {granted or 'not tried'}; {facts}",
+        f"SCHED_FIFO refused, {(granted or 'not tried').partition(':')[0]}; {facts}",
         "better than normal, yet late beside real-time work" if nice else _NORMAL,
         mend,
     )  # fmt: skip

@@ -132,7 +132,8 @@ def wake_up_lateness(sleep: Sleep) -> Finding:
         "wake-up lateness",
         level,
         f"p50 / p99 / p99.9 {cuts} ms at {sleep.rate_hz:g} Hz, {sleep.lost} of "
-        f"{sleep.late.total + sleep.lost} slots lost in {sleep.seconds:g} s, {sleep.scheduling}",
+        f"{sleep.late.total + sleep.lost} slots lost in {sleep.seconds:g} s, "
+        f"{sleep.scheduling.partition(':')[0]}",
         "no tick of the guard can be more punctual; a late one pauses the plan's clock, "
         "nothing jumps",
         "" if level is Level.OK else mend,

@@ -185,6 +185,6 @@ def test_every_command_of_the_machine_is_among_them():
 
 def test_the_two_limits_of_the_notes_are_what_the_command_writes():
     notes = (ROOT / "deploy/realtime.md").read_text("utf-8")
-    for line in ("@motionserver - rtprio 60", "@motionserver - nice -10"):
-        assert line in mends.REALTIME_USER
-        assert f"`{line}`" in notes
+    for line in ("- rtprio 60", "- nice -10"):
+        assert f"$USER {line}" in mends.REALTIME_USER
+        assert f"`NAME {line}`" in notes

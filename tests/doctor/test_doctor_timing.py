@@ -47,7 +47,9 @@ def test_the_guard_ticks_at_the_smallest_multiple_of_at_least_240(packets_hz, ti
         ({0.05: 1990, 3.5: 10}, Level.ADVICE),
         ({0.05: 1999, 20.0: 1}, Level.OK),
         ({0.05: 1990, 6.0: 9}, Level.ADVICE),
+        ({0.05: 1980, 5.0: 10}, Level.ADVICE),  # half a percent of the slots, no more
         ({0.05: 1980, 6.0: 20}, Level.WARNING),
+        ({0.05: 1800, 5.0: 100}, Level.WARNING),  # five percent, no more
         ({0.05: 1999, 100.0: 1}, Level.WARNING),
         ({0.05: 1890, 6.0: 110}, Level.PROBLEM),
         ({5.0: 2000}, Level.PROBLEM),
