@@ -9,7 +9,7 @@ REALTIME_USER: Final = (
     "sudo tee -a /etc/security/limits.d/motionserver.conf"
 )
 """Then log in again."""
-REALTIME_SOFT: Final = "ulimit -r 60"
+REALTIME_SOFT: Final = "ulimit -r 50"
 REALTIME_CONTAINER: Final = "docker run --ulimit rtprio=60 --cap-add SYS_NICE"
 REALTIME_GROUP: Final = "docker run --cpu-rt-runtime=400000"
 THROTTLE: Final = "sudo sysctl -w kernel.sched_rt_runtime_us=950000"

@@ -40,14 +40,17 @@ def scheduling_class(tree: Tree, granted: str | None, realtime: bool) -> Finding
             name, Level.OK, f"{granted} granted; {facts}",
             "guard and planner win against everything of normal priority",
         )  # fmt: skip
-    if granted is None and (able or (limit is not None and limit.soft >= GUARD_PRIORITY)):
+    permitted = able or (limit is not None and limit.soft >= GUARD_PRIORITY)
+    if granted is None and permitted:
         return Finding(
             name, Level.OK, f"SCHED_FIFO permitted, not tried; {facts}",
             "guard and planner win against everything of normal priority",
         )  # fmt: skip
     if granted is None and (limit is None or able is None):
         return unknown(name, facts)
-    if limit is not None and limit.hard >= GUARD_PRIORITY:
+    if permitted:
+        mend = mends.REALTIME_GROUP
+    elif limit is not None and limit.hard >= GUARD_PRIORITY:
         mend = mends.REALTIME_SOFT
     elif tree.is_container():
         mend = mends.REALTIME_CONTAINER

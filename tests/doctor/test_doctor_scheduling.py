@@ -31,6 +31,10 @@ def limits(soft, hard, locked="8388608"):
         (0, 0, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_USER),
         (0, 0, PLAIN, NICE, Level.ADVICE, mends.REALTIME_USER),
         (0, 95, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_SOFT),
+        (0, 50, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_SOFT),
+        (0, 49, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_USER),
+        (50, 50, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_GROUP),
+        (30, 30, CAPABLE, NICE, Level.ADVICE, mends.REALTIME_GROUP),
         (29, 29, PLAIN, NORMAL, Level.WARNING, mends.REALTIME_USER),
         (30, 30, PLAIN, NORMAL, Level.PROBLEM, mends.REALTIME_USER),
         (49, 99, PLAIN, NICE, Level.PROBLEM, mends.REALTIME_SOFT),
@@ -59,6 +63,8 @@ def test_a_configuration_that_asks_for_nothing_gets_advice(plant):
 
 def test_a_machine_that_tells_nothing_is_unknown_unless_it_was_tried(plant):
     assert scheduling_class(plant({}), None, True).level is Level.UNKNOWN
+    half = plant({"/proc/self/status": PLAIN})
+    assert scheduling_class(half, None, True).level is Level.UNKNOWN
     assert scheduling_class(plant({}), FIFO, True).level is Level.OK
     assert scheduling_class(plant({}), NORMAL, True).level is Level.WARNING
 

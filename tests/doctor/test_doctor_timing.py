@@ -128,6 +128,7 @@ def test_a_stall_that_a_slow_grid_bears_is_no_promise_for_a_fast_one():
 def test_stall_levels(longest_ms, packets_hz, level):
     finding = stalls(slept({0.05: 1000, longest_ms: 1}), packets_hz)
     assert finding.level is level
+    assert bool(finding.mend) == (level is not Level.OK)
     if level is Level.OK:
         assert finding.found.startswith("0 wake-ups later than 5 ms")
     else:
