@@ -95,8 +95,11 @@ def v1(quota_us):
         (v2("400000 100000"), Level.ADVICE, "4 processors in each 100 ms"),
         (v2("400000 100000", 7), Level.WARNING, "4 processors in each 100 ms"),
         (v2("150000 100000"), Level.WARNING, "1.5 processors in each 100 ms"),
+        (v2("200000 100000"), Level.ADVICE, "2 processors in each 100 ms"),
+        (v2("100000 100000"), Level.WARNING, "1 processors in each 100 ms"),
         (v2("50000 100000"), Level.PROBLEM, "0.5 processors in each 100 ms"),
         (v2("50000 100000", folder="/sys/fs/cgroup/a/b"), Level.PROBLEM, "0.5 processors"),
+        ({**v1(25000), "/sys/fs/cgroup/cpu,cpuacct/x/cpu.cfs_period_us": ""}, Level.OK, "none"),
         (v1(25000), Level.PROBLEM, "0.5 processors in each 50 ms"),
         ({}, Level.UNKNOWN, "/proc/self/cgroup cannot be read"),
     ],
@@ -123,7 +126,9 @@ def test_stolen_time_is_read_and_guest_time_is_not_counted_twice(plant):
     assert stolen(tree) == Stolen(1000, 40)
 
 
-@pytest.mark.parametrize("text", ["cpu  1 2 3 4\n", "intr 5\n", ""])
+@pytest.mark.parametrize(
+    "text", ["cpu  1 2 3 4\n", "cpu  1 2 3 4 5 6 7\n", "\nintr 5\n", "cpu0 1 2 3 4 5 6 7 8\n", ""]
+)
 def test_a_kernel_that_tells_no_stolen_time(plant, text):
     assert stolen(plant({"/proc/stat": text})) is None
 
@@ -138,6 +143,7 @@ def test_a_kernel_that_tells_no_stolen_time(plant, text):
         (Stolen(1000000, 0), Stolen(1001000, 20), Level.WARNING, "2.00% while watched"),
         (Stolen(1000000, 0), Stolen(1001000, 60), Level.PROBLEM, "6.00% while watched"),
         (Stolen(1000, 0), Stolen(1000, 0), Level.OK, "0.00% while watched"),
+        (Stolen(0, 0), Stolen(0, 0), Level.UNKNOWN, "/proc/stat tells no stolen time"),
         (None, Stolen(1000, 0), Level.UNKNOWN, "/proc/stat tells no stolen time"),
         (Stolen(1000, 0), None, Level.UNKNOWN, "/proc/stat tells no stolen time"),
     ],
@@ -145,4 +151,7 @@ def test_a_kernel_that_tells_no_stolen_time(plant, text):
 def test_steal_levels(before, after, level, found):
     finding = steal_time(before, after)
     assert finding.level is level
+    bad = level not in (Level.OK, Level.UNKNOWN)
+    assert bool(finding.mend) == bad
+    assert ("nothing in this machine mends" in finding.means) == bad
     assert finding.found.startswith(found)
