@@ -90,6 +90,8 @@ def test_open_file_levels(plant, soft, level):
     assert finding.level is level
     bad = level in (Level.WARNING, Level.PROBLEM)
     assert finding.mend == (mends.OPEN_FILES if bad else "")
+    assert finding.found.startswith(soft or "/proc/self/limits")
+    assert ("hard 4096" in finding.found) == (soft not in (None, "unlimited"))
 
 
 @pytest.mark.parametrize(
@@ -127,6 +129,12 @@ def test_open_file_levels(plant, soft, level):
             ["3,5,9,-;INFO: task kworker/0:1:33 blocked for more than 120 seconds."],
             Level.ADVICE,
             "1 since the boot: blocked for more than 120 seconds; the longest 120 s",
+        ),
+        (
+            [f"4,5,9,-;hrtimer: interrupt took {n} ns" for n in (1, 2, 3_000_000)],
+            Level.ADVICE,
+            "3 since the boot: hrtimer: interrupt took 1 ns; hrtimer: interrupt took 2 ns; "
+            "hrtimer: interrupt took 3000000 ns; the longest 0.003 s",
         ),
         (
             [f"4,5,9,-;hrtimer: interrupt took {n} ns" for n in (1, 2, 3, 4, 9_000_000)]

@@ -60,6 +60,19 @@ def test_no_table_no_route(plant):
             Level.PROBLEM, "198.51.100.7 by eth1 (unknown)", "put the cable in",
         ),
         (
+            Way("198.51.100.7", "198.51.100.1"), {"eth1/operstate": "up"},
+            Level.OK, "198.51.100.7 by eth1 (up)", "",
+        ),
+        (
+            Way("198.51.100.7", "198.51.100.1"), {"eth1/carrier": "1"},
+            Level.OK, "198.51.100.7 by eth1 (link unknown)", "",
+        ),
+        (
+            Way("198.51.100.7", "198.51.100.1", -1), {},
+            Level.PROBLEM, "no way from 198.51.100.1 to 198.51.100.7: no reason given",
+            "ip route get 198.51.100.7",
+        ),
+        (
             Way("203.0.113.5", "192.0.2.2"), {"eth0/operstate": "up"},
             Level.WARNING, "203.0.113.5 by eth0 (up), through a router", "put the platform on",
         ),
