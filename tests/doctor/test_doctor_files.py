@@ -115,6 +115,7 @@ def test_a_read_only_mount_and_a_file_in_the_way(tmp_path):
     (root / "proc/self/mountinfo").write_text(f"1 0 0:1 / {tmp_path} ro - ext4 a ro\n")
     assert look_at(Tree(root), tmp_path / "x").writable is False
     (tmp_path / "file").write_text("")
+    (tmp_path / "file").chmod(0o700)
     assert look_at(Tree(tmp_path / "none"), tmp_path / "file/x").writable is False
 
 
