@@ -158,6 +158,7 @@ def _taken(name: str, tried: Tried, runs: bool) -> Finding:
     found = f"{address} taken by process {holder.pid}: {holder.command}"
     if holder.is_ours and runs:
         return Finding(name, Level.ADVICE, found, "the server runs already; a second is refused")
-    return Finding(
-        name, Level.PROBLEM, found, cannot, f"kill {holder.pid}, or change {address.key}"
-    )
+    change = f"change {address.key}"
+    # another server's process must not be killed: it may hold a platform up
+    mend = change if holder.is_ours else f"kill {holder.pid}, or {change}"
+    return Finding(name, Level.PROBLEM, found, cannot, mend)

@@ -97,7 +97,11 @@ PAGE = Address("page's address", "[web] host, port", "tcp", "127.0.0.1", 8080)
         (
             Tried(PAGE, errno.EADDRINUSE, Holder(18, GUARD)), False, Level.PROBLEM,
             f"tcp 127.0.0.1:8080 taken by process 18: {GUARD}",
-            "kill 18, or change [web] host, port",
+            "change [web] host, port",
+        ),
+        (
+            Tried(PAGE, errno.EADDRINUSE, Holder(5, "nginx")), False, Level.PROBLEM,
+            "tcp 127.0.0.1:8080 taken by process 5: nginx", "kill 5, or change [web] host, port",
         ),
         (
             Tried(PAGE, errno.EADDRINUSE, Holder(5, "nginx")), True, Level.PROBLEM,

@@ -83,6 +83,8 @@ def test_what_mends_lateness_depends_on_the_scheduling():
          "4.17 ms, fine; by wake-ups alone 480 Hz too"),
         ({0.05: 1990, 2.5: 10}, 240.0, "guard at 240 Hz: p99.9 lateness 2.50 ms of a period of "
          "4.17 ms, fine"),
+        ({0.05: 990, 2.5: 10}, 240.0, "guard at 240 Hz: p99.9 lateness 2.50 ms of a period of "
+         "4.17 ms, fine"),
         ({0.05: 990, 2.5: 9}, 240.0, "guard at 240 Hz: largest lateness 2.50 ms of a period of "
          "4.17 ms, fine"),
         ({0.05: 1990, 3.5: 10}, 240.0, "guard at 240 Hz: p99.9 lateness 3.50 ms of a period of "
