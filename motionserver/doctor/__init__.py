@@ -1,0 +1,1 @@
+"""What this machine can promise, in plain words, and the command that mends each finding."""
