@@ -14,6 +14,7 @@ from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ, Drive, no_motion
+from motionserver.evaluate.files import check_file
 from motionserver.evaluate.hearing import LONGEST_PREVIEW
 from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
@@ -80,7 +81,7 @@ def evaluate(
             "--preview", f"{preview:g} s is out of range", f"Give 0 to {LONGEST_PREVIEW:g} s."
         )
     for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
-        _check_folder(option, path)
+        check_file(option, path)
     recording = read_recording(input_csv)
 
     def tell(text: str) -> None:
@@ -164,12 +165,4 @@ def _check(
             "--setpoints",
             f"one algorithm moves one platform; {len(algorithms)} are given",
             "Give exactly one name to --algorithm.",
-        )
-
-
-def _check_folder(option: str, path: str | Path | None) -> None:
-    """Refuse before minutes of work what could not be written after them."""
-    if path is not None and (not Path(path).parent.is_dir() or Path(path).is_dir()):
-        raise ConfigError(
-            f"{option} {path}", "is no file in an existing folder", "Name a file to write."
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 from motionserver.core.limits import Machine
 from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.recording import Recording, read_recording
 from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.criterion import SICKNESS_WEIGHT, Criterion
@@ -85,11 +86,7 @@ def tune(
     machine = load_machine(platform) if isinstance(platform, str) else platform
     machine = machine if head is None else machine.with_head(head)  # type: ignore[arg-type]
     _check(algorithm, trials, refine, seed, excerpt, planner_hz, scale, jobs)
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out {out}", str(error.strerror), "Name a folder.") from error
+    folder = make_folder("--out", out)
     drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
     stretches = stretches_of(drives, excerpt)
     base = apply_changes(

@@ -14,6 +14,7 @@ import numpy as np
 from motionserver import __version__
 from motionserver.cueing.predictor import Predictor, save
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.fit_predictor import fit
 from motionserver.evaluate.page import STYLE
 from motionserver.evaluate.recording import Recording, read_recording
@@ -49,11 +50,7 @@ def tune_predictor(
         raise ConfigError(
             "--predictor", f"{name!r} is no name", "Give lower-case letters, digits, hyphens."
         )
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out {out}", str(error.strerror), "Name a folder.") from error
+    folder = make_folder("--out", out)
     drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
     words = ["motionserver", "tune", "--predictor", name]
     words += [f"{r.name}.csv" if isinstance(r, Recording) else str(r) for r in recordings]
