@@ -9,6 +9,7 @@ from pathlib import Path
 
 from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.omct.boundaries import read_boundaries
 from motionserver.evaluate.omct.page import to_html
 from motionserver.evaluate.omct.report import conditions, to_mapping, to_text
@@ -48,6 +49,7 @@ def omct(
     if not 0.05 <= amplitude <= 10.0:
         raise ConfigError("--amplitude", f"{amplitude:g} m/s2", "Give 0.05 to 10 m/s2.")
     boundaries = None if boundaries_file is None else read_boundaries(boundaries_file)
+    make_folder("--out", out)
     machine, tuning = options.machine(), options.tuning()
 
     def tell(text: str) -> None:
@@ -88,7 +90,6 @@ def omct(
             "notes": notes,
         },
     )
-    out.mkdir(parents=True, exist_ok=True)
     (out / "omct.txt").write_text(text, encoding="utf-8")
     (out / "omct.json").write_text(
         json.dumps(mapping, indent=1, allow_nan=False) + "\n", encoding="utf-8"
