@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 from motionserver.cli.commands import app
+from motionserver.cli.modes import EVALUATE, TUNE_PREDICTOR, refuse_idle
 
 
 @app.command()
 def evaluate(
+    context: typer.Context,
     recording: Annotated[Path | None, typer.Argument(help="recording", metavar="INPUT.csv")] = None,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
@@ -90,12 +92,19 @@ def evaluate(
     from motionserver.evaluate.options import EvaluateOptions
 
     sines = compare is None and recording == Path("omct")
+    if compare is None and recording is None:
+        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
+    mode = "--predictions" if predictions else "INPUT.csv"
+    mode = "--compare" if compare is not None else "omct" if sines else mode
+    refuse_idle(context, mode, EVALUATE)
+    if planner_rate is None:
+        planner_rate = 50.0 if sines else 100.0
     options = EvaluateOptions(
         algorithm,
         platform,
         scale,
         rate,
-        planner_rate or (50.0 if sines else 100.0),
+        planner_rate,
         head,
         reference,
         tilt_rate,
@@ -113,8 +122,7 @@ def evaluate(
         raise typer.Exit(run_compare(compare, out, options))
     if sines:
         raise typer.Exit(run_omct(out, options, amplitude, boundaries))
-    if recording is None:
-        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
+    assert recording is not None
     if predictions:
         raise typer.Exit(run_predictions(recording, options))
     raise typer.Exit(run_evaluate(recording, options))
@@ -122,6 +130,7 @@ def evaluate(
 
 @app.command()
 def tune(
+    context: typer.Context,
     recordings: Annotated[
         list[Path],
         typer.Argument(
@@ -178,6 +187,7 @@ def tune(
     from motionserver.cli.tuning import run_predictor, run_tune
 
     if predictor:
+        refuse_idle(context, "--predictor", TUNE_PREDICTOR, rest="a search")
         raise typer.Exit(run_predictor(recordings, predictor, out))
     options = {
         "algorithm": algorithm, "criterion": criterion, "trials": trials, "refine": refine,
