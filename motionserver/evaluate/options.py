@@ -17,6 +17,7 @@ from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ
 from motionserver.evaluate.lockstep import PLANNER_HZ
+from motionserver.evaluate.ranges import check_scale, check_times
 from motionserver.settings.fields import TuningError
 from motionserver.settings.machine import load_machine
 from motionserver.settings.tuning import apply_changes, default_for
@@ -50,6 +51,9 @@ class EvaluateOptions:
         setpoints: File for set-points, or None.
         json_out: File for figures, or None.
         html_out: File for the page, or None.
+
+    Raises:
+        ConfigError: A rate or the preview is out of range.
     """
 
     algorithm: str
@@ -69,6 +73,9 @@ class EvaluateOptions:
     setpoints: Path | None = None
     json_out: Path | None = None
     html_out: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_times(self.rate, self.planner_hz, self.preview)
 
     def algorithms(self) -> list[str]:
         """Names of algorithms."""
@@ -145,7 +152,10 @@ def tuning_from(
     tuning = model.to_tuning()
     if tilt_rate:
         tuning = replace(tuning, tilt_rate=_rate(tilt_rate))
-    return tuning if scale is None else replace(tuning, scale=scale)
+    if scale is None:
+        return tuning
+    check_scale(scale)
+    return replace(tuning, scale=scale)
 
 
 def _rate(text: str) -> float:

@@ -77,9 +77,9 @@ def test_a_fit_takes_recordings_and_a_folder_only(called):
 
 @pytest.mark.parametrize("words", ["drive.csv", "--compare folder", "omct"])
 def test_a_planner_rate_of_nothing_is_not_taken_for_none_given(words, called):
-    assert prompt(f"evaluate {words} --planner-rate 0").exit_code == 0
-    (_, given), *_ = called
-    assert next(each for each in given if hasattr(each, "planner_hz")).planner_hz == 0.0
+    done = prompt(f"evaluate {words} --planner-rate 0")
+    assert "--planner-rate: 0 Hz is out of range" in str(done.exception)
+    assert called == []
 
 
 def test_every_parameter_of_evaluate_goes_somewhere():

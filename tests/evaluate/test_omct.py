@@ -160,7 +160,11 @@ def test_senseless_boundaries_are_refused(text, message, tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "amplitude", "message"),
-    [({"algorithm": "classic"}, 1.0, "--algorithm"), ({}, 0.0, "--amplitude")],
+    [
+        ({"algorithm": "classic"}, 1.0, "--algorithm"),
+        ({"algorithm": "classical,classical"}, 1.0, "may stand once"),
+        ({}, 0.0, "--amplitude"),
+    ],
 )
 def test_wrong_arguments_of_omct_are_refused(change, amplitude, message, tmp_path):
     with pytest.raises(ConfigError, match=message):

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from motionserver.core.limits import Machine
-from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
+from motionserver.evaluate.ranges import PLANNER_RATES_HZ, check_algorithms
 from motionserver.evaluate.recording import Recording, read_recording
 from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.criterion import SICKNESS_WEIGHT, Criterion
@@ -162,17 +162,13 @@ def _check(
     scale: float,
     jobs: int,
 ) -> None:
-    known = known_algorithms()
-    if algorithm not in known:
-        raise ConfigError(
-            "--algorithm", f"unknown algorithm {algorithm!r}", f"Allowed: {', '.join(known)}."
-        )
+    check_algorithms([algorithm])
     for option, value, low, high, unit in (
         ("--trials", trials, 2, 2000, ""),
         ("--refine", refine, 0, 500, ""),
         ("--seed", seed, 0, 2**31 - 1, ""),
         ("--jobs", jobs, 0, 256, ""),
-        ("--planner-rate", planner_hz, 20, 250, " Hz"),
+        ("--planner-rate", planner_hz, *PLANNER_RATES_HZ, " Hz"),
         ("--scale", scale, 0.05, 1, ""),
         ("--excerpt", excerpt, 0, 1e5, " s"),
     ):
