@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motionserver.errors import ConfigError
 from motionserver.evaluate.bench import command
 from motionserver.evaluate.bench.latency import ages, bench_latency, first_changes, loopback_floor
 from motionserver.evaluate.bench.loop import bench_loop
@@ -191,7 +192,22 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys, monkeypatch):
     assert asked[-1] == PlanBench(50, only="classical")
 
 
-@pytest.mark.parametrize(("what", "seconds", "ticks"), [("everything", 1.0, 5), ("plan", 1.0, 0)])
-def test_the_command_refuses_what_it_cannot_do(what, seconds, ticks):
-    with pytest.raises(ValueError, match="allowed are loop, plan, latency or all"):
+@pytest.mark.parametrize(
+    ("what", "seconds", "ticks", "message"),
+    [
+        ("everything", 1.0, 5, "bench: unknown 'everything'. Allowed: loop, plan, latency, all"),
+        ("plan", 1.0, 0, "--ticks: 0 is out of range. Give 1 to 360000"),
+        ("plan", 1.0, 10**6, "--ticks"),
+        ("loop", 0.0, None, "--seconds: 0 s is out of range. Give 0.01 to 3600 s"),
+        ("loop", math.nan, None, "--seconds"),
+    ],
+)
+def test_the_command_refuses_what_it_cannot_do(what, seconds, ticks, message):
+    with pytest.raises(ConfigError, match=message):
         command.run_bench(what, seconds, None, ticks)
+
+
+def test_figures_that_could_not_be_written_are_not_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "bench_plan", lambda _: pytest.fail("measured"))
+    with pytest.raises(ConfigError, match=r"--json .*no file in an existing folder"):
+        command.run_bench("plan", 1.0, tmp_path / "nowhere" / "out.json")
