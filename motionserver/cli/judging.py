@@ -10,6 +10,12 @@ import typer
 from motionserver.cli.commands import app
 from motionserver.cli.modes import EVALUATE, TUNE_PREDICTOR, refuse_idle
 
+Platform = Annotated[str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")]
+Head = Annotated[
+    str, typer.Option("--head", help="driver's head from the reference point [m]", metavar="X,Y,Z")
+]
+Figures = Annotated[Path | None, typer.Option("--json", help="write all figures", metavar="OUT")]
+
 
 @app.command()
 def evaluate(
@@ -18,9 +24,7 @@ def evaluate(
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
     ] = "mpc,thondel2014,classical",
-    platform: Annotated[
-        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
-    ] = "t2-compact",
+    platform: Platform = "t2-compact",
     scale: Annotated[
         float | None, typer.Option("--scale", help="share wanted, else the tuning's", metavar="K")
     ] = None,
@@ -29,9 +33,7 @@ def evaluate(
         float | None,
         typer.Option("--planner-rate", help="100, for omct 50 unless told", metavar="HZ"),
     ] = None,
-    head: Annotated[
-        str, typer.Option("--head", help="from the reference point [m]", metavar="X,Y,Z")
-    ] = "",
+    head: Head = "",
     reference: Annotated[
         str, typer.Option("--reference", help="reference model", metavar="NAME")
     ] = "",
@@ -80,15 +82,15 @@ def evaluate(
             "--setpoints", help="write executed samples of the only --algorithm", metavar="OUT.csv"
         ),
     ] = None,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
-    ] = None,
+    json_out: Figures = None,
     html_out: Annotated[
         Path | None, typer.Option("--html", help="write a report", metavar="OUT")
     ] = None,
 ) -> None:
     """Judge algorithms offline with the live code: a recording, a folder of them, or sines."""
-    from motionserver.cli.offline import run_compare, run_evaluate, run_omct, run_predictions
+    from motionserver.cli.offline import run_evaluate, run_predictions
+    from motionserver.evaluate.compare import command as comparison
+    from motionserver.evaluate.omct import command as sine_test
     from motionserver.evaluate.options import EvaluateOptions
 
     sines = compare is None and recording == Path("omct")
@@ -119,9 +121,9 @@ def evaluate(
         html_out,
     )
     if compare is not None:
-        raise typer.Exit(run_compare(compare, out, options))
+        raise typer.Exit(comparison.compare(compare, out, options))
     if sines:
-        raise typer.Exit(run_omct(out, options, amplitude, boundaries))
+        raise typer.Exit(sine_test.omct(out, options, amplitude, boundaries))
     assert recording is not None
     if predictions:
         raise typer.Exit(run_predictions(recording, options))
@@ -151,12 +153,8 @@ def tune(
         int, typer.Option("--refine", help="more of them near the best of each fold", metavar="N")
     ] = 0,
     seed: Annotated[int, typer.Option("--seed", help="of everything random", metavar="S")] = 0,
-    platform: Annotated[
-        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
-    ] = "t2-compact",
-    head: Annotated[
-        str, typer.Option("--head", help="driver's head on the platform [m]", metavar="X,Y,Z")
-    ] = "",
+    platform: Platform = "t2-compact",
+    head: Head = "",
     excerpt: Annotated[
         float, typer.Option("--excerpt", help="most eventful seconds judged; 0 = all", metavar="S")
     ] = 20.0,
@@ -206,9 +204,9 @@ def reproduce(
     ] = Path("out/thondel2014"),
 ) -> None:
     """Redraw a paper's figures; exits non-zero when its claims no longer hold."""
-    from motionserver.cli.offline import run_reproduce
+    from motionserver.evaluate.reproduce.command import reproduce as redraw
 
-    raise typer.Exit(run_reproduce(paper, out))
+    raise typer.Exit(redraw(paper, out))
 
 
 @app.command()
@@ -217,9 +215,7 @@ def bench(
     seconds: Annotated[
         float, typer.Option("--seconds", help="length of each part", metavar="S")
     ] = 20.0,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
-    ] = None,
+    json_out: Figures = None,
     ticks: Annotated[
         int | None, typer.Option("--ticks", help="plan: periods per case", metavar="N")
     ] = None,
@@ -231,6 +227,6 @@ def bench(
     ] = "",
 ) -> None:
     """Measure lateness, plan times and latency beside a sentinel that only sleeps."""
-    from motionserver.cli.offline import run_bench
+    from motionserver.evaluate.bench.command import run_bench
 
     raise typer.Exit(run_bench(what, seconds, json_out, ticks, paced, only))

@@ -1,4 +1,4 @@
-"""evaluate, reproduce, bench."""
+"""evaluate: one recording, driven or only foretold."""
 
 from __future__ import annotations
 
@@ -45,38 +45,3 @@ def run_predictions(recording: Path, options: EvaluateOptions) -> int:
     )
     sys.stdout.write(to_text(found))
     return 0
-
-
-def run_compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
-    """Compare on all recordings of a folder; 1 if any limit was broken."""
-    from motionserver.evaluate.compare.command import compare
-
-    return compare(folder, out, options)
-
-
-def run_omct(out: Path, options: EvaluateOptions, amplitude: float, boundaries: Path | None) -> int:
-    """Measure frequency responses; 1 if any limit was broken."""
-    from motionserver.evaluate.omct.command import omct
-
-    return omct(out, options, amplitude, boundaries)
-
-
-def run_reproduce(paper: str, out: Path) -> int:
-    """Redraw a paper; 1 if a claim no longer holds."""
-    from motionserver.evaluate.reproduce.command import reproduce
-
-    return reproduce(paper, out)
-
-
-def run_bench(
-    what: str,
-    seconds: float,
-    json_out: Path | None,
-    ticks: int | None = None,
-    paced: bool = True,
-    only: str = "",
-) -> int:
-    """Measure and print."""
-    from motionserver.evaluate.bench.command import run_bench as measure
-
-    return measure(what, seconds, json_out, ticks, paced, only)

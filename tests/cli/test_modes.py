@@ -9,8 +9,10 @@ from typer.testing import CliRunner
 from motionserver.cli import judging, offline, tuning
 from motionserver.cli.modes import EVALUATE
 from motionserver.errors import ConfigError
+from motionserver.evaluate.compare import command as comparison
+from motionserver.evaluate.omct import command as sine_test
 
-CALLS = ("run_evaluate", "run_predictions", "run_compare", "run_omct")
+CALLS = ("run_evaluate", "run_predictions", "compare", "omct")
 
 
 @pytest.fixture
@@ -21,8 +23,8 @@ def called(monkeypatch):
     def note(name):
         return lambda *given, **_: seen.append((name, given)) or 0
 
-    for name in CALLS:
-        monkeypatch.setattr(offline, name, note(name))
+    for place, name in zip((offline, offline, comparison, sine_test), CALLS, strict=True):
+        monkeypatch.setattr(place, name, note(name))
     for name in ("run_tune", "run_predictor"):
         monkeypatch.setattr(tuning, name, note(name))
     return seen
