@@ -26,6 +26,7 @@ from motionserver.settings.tuning_presets import NAME, PresetShelf
 FREE_DEG_S: Final = 1000.0
 """The tilt rate that is called "free" [deg/s]."""
 _FARTHEST: Final = 3.0
+"""Of a head from the reference point, along each axis [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,20 +101,29 @@ def machine_at(machine: Machine, head: str) -> Machine:
     Raises:
         ConfigError: These are not three numbers of a head.
     """
-    if not head:
-        return machine
-    parts = head.split(",")
+    point = head_point(head)
+    return machine if point is None else machine.with_head(np.array(point))
+
+
+def head_point(text: str) -> tuple[float, float, float] | None:
+    """The head point of ``X,Y,Z`` [m]; None if empty.
+
+    Raises:
+        ConfigError: These are not three numbers of a head.
+    """
+    if not text:
+        return None
     try:
-        point = [float(part) for part in parts]
+        x, y, z = (float(part) for part in text.split(","))
+        if all(abs(value) <= _FARTHEST for value in (x, y, z)):
+            return x, y, z
     except ValueError:
-        point = []
-    if len(point) != 3 or not all(abs(value) <= _FARTHEST for value in point):
-        raise ConfigError(
-            "--head",
-            f"{head!r} is not X,Y,Z of the driver's head from the reference point",
-            f"Give three numbers in metres, each at most {_FARTHEST:g}, for example 0,0,0.7.",
-        )
-    return machine.with_head(np.array(point))
+        pass
+    raise ConfigError(
+        "--head",
+        f"{text!r} is not X,Y,Z of the driver's head from the reference point",
+        f"Give three numbers in metres, each at most {_FARTHEST:g}, for example 0,0,0.7.",
+    )
 
 
 def tuning_from(

@@ -230,3 +230,5 @@ def test_command_line(tmp_path):
     assert "--head 0,0,0.7" in (out / "report.txt").read_text()
     refused = CliRunner().invoke(app, ["tune", *paths, *options, "--head", "up"])
     assert isinstance(refused.exception, ConfigError)
+    too_far = CliRunner().invoke(app, ["tune", *paths, *options, "--head", "0,0,5"])
+    assert "each at most 3" in str(too_far.exception)

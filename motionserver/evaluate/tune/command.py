@@ -6,6 +6,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
@@ -84,7 +86,7 @@ def tune(
         RecordingError: A recording cannot be read.
     """
     machine = load_machine(platform) if isinstance(platform, str) else platform
-    machine = machine if head is None else machine.with_head(head)  # type: ignore[arg-type]
+    machine = machine if head is None else machine.with_head(np.array(head))
     _check(algorithm, trials, refine, seed, excerpt, planner_hz, scale, jobs)
     folder = make_folder("--out", out)
     drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
