@@ -2,6 +2,8 @@
 
 import json
 import math
+import socket
+import subprocess
 
 import numpy as np
 import pytest
@@ -23,9 +25,10 @@ from motionserver.evaluate.bench.plan import (
 from motionserver.evaluate.bench.plan_accuracy import accuracy_text, measure_accuracy
 from motionserver.evaluate.bench.plan_growth import exponent_of, growth_text, measure_growth
 from motionserver.evaluate.bench.plan_steps import LIVELY, time_plans
-from motionserver.evaluate.bench.processes import BenchError, Helper
+from motionserver.evaluate.bench.processes import BenchError, Helper, free_port
 from motionserver.evaluate.bench.report import row_of_samples
 from motionserver.evaluate.bench.sentinel import Sentinel
+from motionserver.evaluate.bench.server import BenchServer
 from motionserver.settings.machine import load_machine
 
 MS = 1_000_000
@@ -50,6 +53,21 @@ def test_a_process_that_says_nothing_is_an_error(capfd):
     with helper, pytest.raises(BenchError, match="said nothing"):
         helper.line()
     assert "ValueError" in capfd.readouterr().err
+
+
+def test_a_server_that_fell_is_said_with_the_end_of_its_log(tmp_path):
+    server = BenchServer(60.0, realtime=False)
+    (tmp_path / "server.log").write_text("the last word\n")
+    port = str(free_port(socket.SOCK_DGRAM))
+    base = Helper("motionserver.evaluate.bench.base", port, "60", str(tmp_path / "base.log"))
+    fallen = Helper("motionserver", "no-such-command", stderr=subprocess.DEVNULL)
+    with base, fallen:
+        base.line()
+        fallen.process.wait()
+        server._folder, server._base, server._server = tmp_path, base, fallen
+        with pytest.raises(BenchError, match=r"ended by itself, status 2(?s:.*)the last word"):
+            server.stop()
+    assert server.verdict["violations"] == 0
 
 
 @pytest.mark.timeout(240)
