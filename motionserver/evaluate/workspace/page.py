@@ -22,7 +22,7 @@ from motionserver.evaluate.workspace.draw import (
     units,
 )
 from motionserver.evaluate.workspace.draw import STYLE as PICTURE_STYLE
-from motionserver.evaluate.workspace.survey import Plane, Survey
+from motionserver.evaluate.workspace.result import Plane, Survey
 from motionserver.evaluate.workspace.table import corner_counts
 from motionserver.evaluate.workspace.words import corner_of, lopsided, pose_text
 
