@@ -16,7 +16,7 @@ from motionserver.cueing.predictor import Predictor, save
 from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.fit_predictor import fit
-from motionserver.evaluate.page import STYLE
+from motionserver.evaluate.html import document
 from motionserver.evaluate.recording import Recording, read_recording
 from motionserver.evaluate.tune.page import table_html
 from motionserver.evaluate.tune.report import aligned
@@ -123,14 +123,12 @@ def _reports(predictor: Predictor, command: str) -> tuple[str, str]:
     for table in _tables(predictor):
         lines += [table.title, *aligned(table), table.note, ""]
     text = "\n".join([*lines, "again:", f"  {command}"]) + "\n"
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}pre{{overflow-x:auto}}</style></head><body>"
-        f"<h1>{escape(title)}</h1>"
-        + "".join(f'<p class="soft">{escape(fact)}.</p>' for fact in facts)
+    page = document(
+        title,
+        "pre{overflow-x:auto}",
+        "".join(f'<p class="soft">{escape(fact)}.</p>' for fact in facts)
         + "".join(f"<p>{escape(line)}.</p>" for line in worth(predictor))
         + "".join(table_html(table) for table in _tables(predictor))
-        + f'<h2>Again</h2><div class="frame"><pre>{escape(command)}</pre></div></body></html>\n'
+        + f'<h2>Again</h2><div class="frame"><pre>{escape(command)}</pre></div>',
     )
     return text, page
