@@ -8,7 +8,7 @@ from math import degrees
 import numpy as np
 
 from motionserver import __version__
-from motionserver.core.axes import Axis
+from motionserver.core.axes import Array, Axis
 from motionserver.evaluate.drive import Drive
 from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.html import STYLE, cards, document
@@ -110,14 +110,21 @@ def _moves(curves: list[Curve]) -> bool:
     return any(float(np.max(np.abs(curve.values))) > 1e-6 for curve in curves)
 
 
+def _beside(movers: list[Drive], values: list[Array]) -> list[Curve]:
+    """One curve of every drive, each with its colour, the first on top."""
+    curves = [
+        Curve(drive.name, each, 1 + i % 5)
+        for i, (drive, each) in enumerate(zip(movers, values, strict=True))
+    ]
+    return curves[::-1]
+
+
 def _force_panels(movers: list[Drive]) -> list[Panel]:
     panels = []
+    felt = [drive.felt() for drive in movers]
     for axis, name in enumerate(("f_x, forward", "f_y, left", "f_z, up, gravity removed")):
         curves = [Curve("wanted", movers[0].wanted_force[:, axis], 0)]
-        curves += [
-            Curve(d.name, d.felt()[0][:, axis], 1 + i % 5)
-            for i, d in reversed([*enumerate(movers)])
-        ]
+        curves += _beside(movers, [force[:, axis] for force, _ in felt])
         if _moves(curves):
             panels.append(Panel(f"{name} [m/s²]", movers[0].times, curves, height=220))
     return panels
@@ -125,18 +132,15 @@ def _force_panels(movers: list[Drive]) -> list[Panel]:
 
 def _rate_panels(movers: list[Drive]) -> list[Panel]:
     panels = []
+    felt = [drive.felt() for drive in movers]
     for axis, name in enumerate(("roll rate", "pitch rate", "yaw rate")):
         curves = [Curve("wanted", np.degrees(movers[0].wanted_rates[:, axis]), 0)]
-        curves += [
-            Curve(d.name, np.degrees(d.felt()[1][:, axis]), 1 + i % 5)
-            for i, d in reversed([*enumerate(movers)])
-        ]
+        curves += _beside(movers, [np.degrees(rates[:, axis]) for _, rates in felt])
         if _moves(curves):
             panels.append(Panel(f"{name} [deg/s]", movers[0].times, curves, height=170))
-    tilting = [
-        Curve(d.name, np.degrees(tilt_rate(d.wanted_rates, d.felt()[1])), 1 + i % 5)
-        for i, d in reversed([*enumerate(movers)])
-    ]
+    rates_of = zip(movers, felt, strict=True)
+    tilts = [np.degrees(tilt_rate(drive.wanted_rates, rates)) for drive, (_, rates) in rates_of]
+    tilting = _beside(movers, tilts)
     panels.append(
         Panel("tilt rate nobody asked for [deg/s]", movers[0].times, tilting, limits=(3.0,))
     )
