@@ -90,7 +90,9 @@ def evaluate(
     """Judge algorithms offline with the live code: a recording, a folder of them, or sines."""
     from motionserver.cli.offline import run_evaluate, run_predictions
     from motionserver.evaluate.compare import command as comparison
+    from motionserver.evaluate.lockstep import PLANNER_HZ
     from motionserver.evaluate.omct import command as sine_test
+    from motionserver.evaluate.omct.run import PLANNER_HZ as SINES_HZ
     from motionserver.evaluate.options import EvaluateOptions
 
     sines = compare is None and recording == Path("omct")
@@ -100,7 +102,7 @@ def evaluate(
     mode = "--compare" if compare is not None else "omct" if sines else mode
     refuse_idle(context, mode, EVALUATE)
     if planner_rate is None:
-        planner_rate = 50.0 if sines else 100.0
+        planner_rate = SINES_HZ if sines else PLANNER_HZ
     options = EvaluateOptions(
         algorithm,
         platform,

@@ -1,5 +1,6 @@
 """What is written at the prompt means something, or is refused."""
 
+import inspect
 import re
 
 import pytest
@@ -11,6 +12,7 @@ from motionserver.cli.modes import EVALUATE
 from motionserver.errors import ConfigError
 from motionserver.evaluate.compare import command as comparison
 from motionserver.evaluate.omct import command as sine_test
+from motionserver.evaluate.tune.command import tune as search
 
 CALLS = ("run_evaluate", "run_predictions", "compare", "omct")
 
@@ -88,3 +90,16 @@ def test_every_parameter_of_evaluate_goes_somewhere():
     group = typer.main.get_command(judging.app)
     names = {each.name for each in group.commands["evaluate"].params} - {"help"}
     assert names == frozenset().union(*EVALUATE.values())
+
+
+def test_a_search_has_the_same_defaults_at_the_prompt_and_as_a_function():
+    command = typer.main.get_command(judging.app).commands["tune"]
+    params = {each.name: each.default for each in command.params}
+    known = inspect.signature(search).parameters
+    other = {"planner_hz": "planner_rate", "tilt_rate_deg_s": "tilt_rate"}
+    # at the prompt one process drives, for the function this one; nobody's head is the machine's
+    asked = set(known) - {"recordings", "out", "progress", "jobs", "head"}
+    assert len(asked) >= 11
+    assert {name: params[other.get(name, name)] for name in asked} == {
+        name: known[name].default for name in asked
+    }

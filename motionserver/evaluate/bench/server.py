@@ -23,8 +23,8 @@ RAISING: Final = 30.0
 """Longest wait for the platform to run [s]."""
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
-
 FASTEST_PLANNER_HZ: Final = 120.0
+"""What ``rate_max_hz`` of its configuration says [Hz]."""
 OTHERS_PRIORITY: Final = 20
 """For SCHED_FIFO of base and simulator, if permitted: they have computers of their own."""
 
