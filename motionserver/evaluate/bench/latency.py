@@ -29,6 +29,7 @@ from motionserver.evaluate.bench.sentinel import Sentinel
 from motionserver.evaluate.bench.server import OTHERS_PRIORITY, BenchServer
 
 CUE_PERIOD: Final = 0.01
+"""Between two packets of the simulator [s]."""
 STEP: Final = 2.0
 """Size of a step of acceleration [m/s2]."""
 HOLD: Final = (0.3, 0.5)
@@ -36,9 +37,12 @@ HOLD: Final = (0.3, 0.5)
 PATIENCE: Final = 0.2
 """A step that shows later than this is counted as unseen [s]."""
 _BEFORE: Final = 8
+"""Set-points before a step that tell how uneven the motion is anyway."""
 _FLOOR: Final = 2e-6
+"""Least kink of a leg that is one, above the rounding of the words [m]."""
 _ABOVE: Final = 2.0
 _SETTLE: Final = 2.0
+"""Cues before the first step [s]."""
 
 
 class StepSender:
@@ -47,6 +51,7 @@ class StepSender:
     Attributes:
         sent_ns: When each packet was sent [ns].
         steps_ns: When each step was [ns].
+        by_bytes: When each packet was sent, by what was sent [ns].
     """
 
     def __init__(self, port: int, seed: int = 1) -> None:
