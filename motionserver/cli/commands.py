@@ -20,6 +20,7 @@ ConfigFile = Annotated[Path, typer.Argument(help="configuration, TOML", metavar=
 MaybeConfig = Annotated[
     Path | None, typer.Argument(help="configuration of the running server", metavar="CONFIG.toml")
 ]
+Seconds = Annotated[float | None, typer.Option("--seconds", help="end by itself", metavar="S")]
 
 
 def _version(wanted: bool) -> None:
@@ -110,9 +111,7 @@ def record(
     out: Annotated[Path, typer.Option("--out", help="a new file", metavar="FILE.csv")] = Path(
         "drive.csv"
     ),
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
-    ] = None,
+    seconds: Seconds = None,
 ) -> None:
     """Write what a running server does, one row per packet, without touching it."""
     from motionserver.cli.recording import record as record_drive
@@ -131,9 +130,7 @@ def _ask(op: str, config: Path | None) -> None:
 
 @app.command()
 def demo(
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
-    ] = None,
+    seconds: Seconds = None,
     no_page: Annotated[bool, typer.Option("--no-page", help="without the page")] = False,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="mpc, thondel2014 or classical", metavar="NAME")
@@ -172,9 +169,7 @@ def emulate(
     log: Annotated[
         Path | None, typer.Option("--log", help="write every datagram here", metavar="OUT")
     ] = None,
-    seconds: Annotated[
-        float | None, typer.Option("--seconds", help="end by itself", metavar="S")
-    ] = None,
+    seconds: Seconds = None,
     seed: Annotated[int, typer.Option("--seed", help="of everything random")] = 0,
     cut_after: Annotated[
         float | None, typer.Option("--cut-after", help="pull the cable then", metavar="S")

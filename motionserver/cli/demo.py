@@ -17,9 +17,12 @@ from typing import Any, Final
 from motion_clients.recording import recording_names
 
 from motionserver.cli.demo_faults import FAULTS, send_nan
+from motionserver.cli.demo_setup import demo_config
 from motionserver.cli.demo_show import line, verdict_text
 from motionserver.cli.serving import make_service
 from motionserver.errors import ConfigError
+from motionserver.evaluate.bench.processes import free_port
+from motionserver.evaluate.files import check_file
 from motionserver.settings.config import load_config
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.mapped import MappedFile
@@ -51,6 +54,9 @@ class Demo:
         if recording not in recording_names():
             names = ", ".join(recording_names())
             raise ConfigError("--recording", f"unknown {recording!r}", f"Allowed: {names}.")
+        if seconds is not None and not seconds > 0.0:
+            raise ConfigError("--seconds", f"{seconds:g}", "Give a positive number.")
+        check_file("--json", json_out)
         # a page that is to be killed must be there
         self.seconds, self.page, self.algorithm = seconds, page or fault == "web-kill", algorithm
         self.fault, self.recording, self.json_out = fault, recording, json_out
@@ -67,9 +73,11 @@ class Demo:
 
     async def _main(self, folder: Path) -> int:
         self._began = asyncio.get_running_loop().time()
-        base, cue, imu = _free_port(), _free_port(), _free_port()
-        page_port = _free_port(PAGE_PORT)
-        config = load_config(None, _overrides(folder, base, cue, imu, page_port, self))
+        base, cue, imu = (free_port(socket.SOCK_DGRAM) for _ in range(3))
+        page_port = free_port(socket.SOCK_STREAM, PAGE_PORT)
+        page = page_port if self.page else None
+        overrides = demo_config(folder, self.algorithm, base, (cue, imu), page)
+        config = load_config(None, overrides)
         service = make_service(config, folder / "run", dry_run=False)
         verdict = folder / "verdict.json"
         options = ["--listen", f"127.0.0.1:{base}", "--summary", str(verdict)]
@@ -218,37 +226,6 @@ class Demo:
         if self.fault and not self._answered:
             say(f"expected {FAULTS[self.fault]} after {self.fault}, saw {self._states}")
         return 0 if safe and drove and (self._answered or not self.fault) else 1
-
-
-def _overrides(
-    folder: Path, base: int, cue: int, imu: int, page_port: int, demo: Demo
-) -> dict[str, Any]:
-    return {
-        "server": {"run_dir": str(folder / "run"), "state_dir": str(folder / "state")},
-        "platform": {"port": base, "local_port": 0},
-        "sources": [
-            {"kind": "native", "listen": f"127.0.0.1:{cue}"},
-            {"kind": "imu", "listen": f"127.0.0.1:{imu}"},
-        ],
-        "cueing": {"algorithm": demo.algorithm},
-        "operator": {"engage": "http"},
-        "web": {
-            "enabled": demo.page,
-            "port": page_port,
-            "tokens_file": str(folder / "tokens.json"),
-        },
-    }
-
-
-def _free_port(wanted: int = 0) -> int:
-    kind = socket.SOCK_STREAM if wanted else socket.SOCK_DGRAM
-    with socket.socket(socket.AF_INET, kind) as probe:
-        try:
-            probe.bind(("127.0.0.1", wanted))
-        except OSError:
-            probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def _read(source: MappedFile) -> dict[str, Any] | None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 import socket
 import struct
-import zlib
 from typing import Final
 
-from motion_protocol import Cue, Motion, encode_cue
+from motion_protocol import Cue, Mode, Motion, encode_cue
+from motion_protocol.cue import CUE, NO_FLAGS
+from motion_protocol.framing import BLOCK_HEAD, HEADER, close_frame
+
+SESSION: Final = 7
 
 FAULTS: Final = {
     "cue-loss": "PARKED",
@@ -22,26 +26,20 @@ FAULTS: Final = {
 """Fault by name, and the state that must have been reached after it."""
 
 
-_CRC: Final = 40
-_HEADER: Final = 44
-_VALUES: Final = 48
-_CUE_SEED: Final = 0x1BA023E3
-
-
-def _checksum(packet: bytes) -> int:
-    return zlib.crc32(packet[_HEADER:], zlib.crc32(packet[:_CRC], _CUE_SEED))
+def nan_packet(sequence: int) -> bytes:
+    """A well-formed cue, checksum and all, whose every value is not a number."""
+    still = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), speed=0.0)
+    payload = bytearray(encode_cue(Cue(SESSION, sequence, 0, 0, still))[HEADER.size :])
+    struct.pack_into("<6f", payload, BLOCK_HEAD.size, *([math.nan] * 6))
+    return close_frame(
+        CUE, bytes(payload), None, flags=NO_FLAGS, mode=Mode.DRIVE, session=SESSION,
+        sequence=sequence, sim_time_ns=0, sender_time_ns=0,
+    )  # fmt: skip
 
 
 async def send_nan(address: tuple[str, int]) -> None:
     """Be a simulator whose every value is not a number, a hundred times a second."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-        sequence = 0
-        while True:
-            motion = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), speed=0.0)
-            packet = bytearray(encode_cue(Cue(7, sequence, 0, 0, motion)))
-            struct.pack_into("<6f", packet, _VALUES, *([math.nan] * 6))
-            # the checksum runs on from the header's; changing both keeps the packet well-formed
-            struct.pack_into("<I", packet, _CRC, _checksum(bytes(packet)))
-            link.sendto(packet, address)
-            sequence += 1
+        for sequence in itertools.count():
+            link.sendto(nan_packet(sequence), address)
             await asyncio.sleep(0.01)

@@ -14,6 +14,7 @@ from motion_clients.replay import FORMATS
 from motion_clients.replay import replay as send_recording
 
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import check_file
 from motionserver.settings.config import split_address
 from motionserver.telemetry.realtime import take_priority
 
@@ -43,6 +44,9 @@ def emulate(
     if form not in EMULATORS:
         raise ConfigError("FORMAT", f"unknown {form!r}", f"Allowed: {', '.join(EMULATORS)}.")
     host, port = _address("--listen", listen)
+    to = _address("--force-to", force_to) if force_to else None
+    check_file("--summary", summary)
+    check_file("--log", log)
     take_priority(PUNCTUAL, wanted=True)
     cut = LinkFlaws()
     if cut_after is not None:
@@ -55,7 +59,7 @@ def emulate(
             duration=seconds,
             log_path=log,
             summary_path=summary,
-            force_to=_address("--force-to", force_to) if force_to else None,
+            force_to=to,
             seed=seed,
             to_base=cut,
             to_host=cut,
@@ -78,4 +82,8 @@ def replay(recording: str, to: str, form: str, loop: bool, preview: float) -> st
         counts = send_recording(path, host, port, fmt=form, stop=stop, loop=loop, preview=preview)
     except RecordingError as error:
         raise ConfigError("INPUT.csv", str(error), "Correct the file.") from error
+    except ValueError as error:
+        raise ConfigError("replay", str(error), "Correct the option.") from error
+    except OSError as error:
+        raise ConfigError(f"--to {to}", str(error.strerror), "Give another HOST:PORT.") from error
     return f"sent {counts.sent} packets in {counts.rounds} rounds, {counts.unsent} not sent"

@@ -8,17 +8,23 @@ from typing import Annotated
 import typer
 
 from motionserver.cli.commands import app
+from motionserver.cli.modes import EVALUATE, TUNE_PREDICTOR, refuse_idle
+
+Platform = Annotated[str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")]
+Head = Annotated[
+    str, typer.Option("--head", help="driver's head from the reference point [m]", metavar="X,Y,Z")
+]
+Figures = Annotated[Path | None, typer.Option("--json", help="write all figures", metavar="OUT")]
 
 
 @app.command()
 def evaluate(
+    context: typer.Context,
     recording: Annotated[Path | None, typer.Argument(help="recording", metavar="INPUT.csv")] = None,
     algorithm: Annotated[
         str, typer.Option("--algorithm", help="names, comma between", metavar="A,B")
     ] = "mpc,thondel2014,classical",
-    platform: Annotated[
-        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
-    ] = "t2-compact",
+    platform: Platform = "t2-compact",
     scale: Annotated[
         float | None, typer.Option("--scale", help="share wanted, else the tuning's", metavar="K")
     ] = None,
@@ -27,9 +33,7 @@ def evaluate(
         float | None,
         typer.Option("--planner-rate", help="100, for omct 50 unless told", metavar="HZ"),
     ] = None,
-    head: Annotated[
-        str, typer.Option("--head", help="from the reference point [m]", metavar="X,Y,Z")
-    ] = "",
+    head: Head = "",
     reference: Annotated[
         str, typer.Option("--reference", help="reference model", metavar="NAME")
     ] = "",
@@ -78,24 +82,33 @@ def evaluate(
             "--setpoints", help="write executed samples of the only --algorithm", metavar="OUT.csv"
         ),
     ] = None,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
-    ] = None,
+    json_out: Figures = None,
     html_out: Annotated[
         Path | None, typer.Option("--html", help="write a report", metavar="OUT")
     ] = None,
 ) -> None:
     """Judge algorithms offline with the live code: a recording, a folder of them, or sines."""
-    from motionserver.cli.offline import run_compare, run_evaluate, run_omct, run_predictions
+    from motionserver.cli.offline import run_evaluate, run_predictions
+    from motionserver.evaluate.compare import command as comparison
+    from motionserver.evaluate.lockstep import PLANNER_HZ
+    from motionserver.evaluate.omct import command as sine_test
+    from motionserver.evaluate.omct.run import PLANNER_HZ as SINES_HZ
     from motionserver.evaluate.options import EvaluateOptions
 
     sines = compare is None and recording == Path("omct")
+    if compare is None and recording is None:
+        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
+    mode = "--predictions" if predictions else "INPUT.csv"
+    mode = "--compare" if compare is not None else "omct" if sines else mode
+    refuse_idle(context, mode, EVALUATE)
+    if planner_rate is None:
+        planner_rate = SINES_HZ if sines else PLANNER_HZ
     options = EvaluateOptions(
         algorithm,
         platform,
         scale,
         rate,
-        planner_rate or (50.0 if sines else 100.0),
+        planner_rate,
         head,
         reference,
         tilt_rate,
@@ -110,11 +123,10 @@ def evaluate(
         html_out,
     )
     if compare is not None:
-        raise typer.Exit(run_compare(compare, out, options))
+        raise typer.Exit(comparison.compare(compare, out, options))
     if sines:
-        raise typer.Exit(run_omct(out, options, amplitude, boundaries))
-    if recording is None:
-        raise typer.BadParameter("a recording, the word omct, or --compare FOLDER is needed")
+        raise typer.Exit(sine_test.omct(out, options, amplitude, boundaries))
+    assert recording is not None
     if predictions:
         raise typer.Exit(run_predictions(recording, options))
     raise typer.Exit(run_evaluate(recording, options))
@@ -122,6 +134,7 @@ def evaluate(
 
 @app.command()
 def tune(
+    context: typer.Context,
     recordings: Annotated[
         list[Path],
         typer.Argument(
@@ -142,12 +155,8 @@ def tune(
         int, typer.Option("--refine", help="more of them near the best of each fold", metavar="N")
     ] = 0,
     seed: Annotated[int, typer.Option("--seed", help="of everything random", metavar="S")] = 0,
-    platform: Annotated[
-        str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")
-    ] = "t2-compact",
-    head: Annotated[
-        str, typer.Option("--head", help="driver's head on the platform [m]", metavar="X,Y,Z")
-    ] = "",
+    platform: Platform = "t2-compact",
+    head: Head = "",
     excerpt: Annotated[
         float, typer.Option("--excerpt", help="most eventful seconds judged; 0 = all", metavar="S")
     ] = 20.0,
@@ -178,6 +187,7 @@ def tune(
     from motionserver.cli.tuning import run_predictor, run_tune
 
     if predictor:
+        refuse_idle(context, "--predictor", TUNE_PREDICTOR, rest="a search")
         raise typer.Exit(run_predictor(recordings, predictor, out))
     options = {
         "algorithm": algorithm, "criterion": criterion, "trials": trials, "refine": refine,
@@ -196,9 +206,9 @@ def reproduce(
     ] = Path("out/thondel2014"),
 ) -> None:
     """Redraw a paper's figures; exits non-zero when its claims no longer hold."""
-    from motionserver.cli.offline import run_reproduce
+    from motionserver.evaluate.reproduce.command import reproduce as redraw
 
-    raise typer.Exit(run_reproduce(paper, out))
+    raise typer.Exit(redraw(paper, out))
 
 
 @app.command()
@@ -207,9 +217,7 @@ def bench(
     seconds: Annotated[
         float, typer.Option("--seconds", help="length of each part", metavar="S")
     ] = 20.0,
-    json_out: Annotated[
-        Path | None, typer.Option("--json", help="write all figures", metavar="OUT")
-    ] = None,
+    json_out: Figures = None,
     ticks: Annotated[
         int | None, typer.Option("--ticks", help="plan: periods per case", metavar="N")
     ] = None,
@@ -221,6 +229,6 @@ def bench(
     ] = "",
 ) -> None:
     """Measure lateness, plan times and latency beside a sentinel that only sleeps."""
-    from motionserver.cli.offline import run_bench
+    from motionserver.evaluate.bench.command import run_bench
 
     raise typer.Exit(run_bench(what, seconds, json_out, ticks, paced, only))

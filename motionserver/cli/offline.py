@@ -1,17 +1,13 @@
-"""evaluate, reproduce, bench."""
+"""evaluate: one recording, driven or only foretold."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-from motionserver.errors import ConfigError
 from motionserver.evaluate.command import evaluate
 from motionserver.evaluate.options import EvaluateOptions
 from motionserver.evaluate.report import to_text
-
-PAPERS = ("thondel2014",)
-BENCHES = ("loop", "plan", "latency", "all")
 
 
 def run_evaluate(recording: Path, options: EvaluateOptions) -> int:
@@ -49,42 +45,3 @@ def run_predictions(recording: Path, options: EvaluateOptions) -> int:
     )
     sys.stdout.write(to_text(found))
     return 0
-
-
-def run_compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
-    """Compare on all recordings of a folder; 1 if any limit was broken."""
-    from motionserver.evaluate.compare.command import compare
-
-    return compare(folder, out, options)
-
-
-def run_omct(out: Path, options: EvaluateOptions, amplitude: float, boundaries: Path | None) -> int:
-    """Measure frequency responses; 1 if any limit was broken."""
-    from motionserver.evaluate.omct.command import omct
-
-    return omct(out, options, amplitude, boundaries)
-
-
-def run_reproduce(paper: str, out: Path) -> int:
-    """Redraw a paper; 1 if a claim no longer holds."""
-    if paper not in PAPERS:
-        raise ConfigError("PAPER", f"unknown {paper!r}", f"Allowed: {', '.join(PAPERS)}.")
-    from motionserver.evaluate.reproduce.command import reproduce
-
-    return reproduce(paper, out)
-
-
-def run_bench(
-    what: str,
-    seconds: float,
-    json_out: Path | None,
-    ticks: int | None = None,
-    paced: bool = True,
-    only: str = "",
-) -> int:
-    """Measure and print."""
-    if what not in BENCHES:
-        raise ConfigError("bench", f"unknown {what!r}", f"Allowed: {', '.join(BENCHES)}.")
-    from motionserver.evaluate.bench.command import run_bench as measure
-
-    return measure(what, seconds, json_out, ticks, paced, only)

@@ -1,4 +1,4 @@
-"""run, check, engage, park, reset, status."""
+"""run, engage, park, reset, status, and what a configuration means."""
 
 from __future__ import annotations
 
@@ -18,11 +18,9 @@ from motionserver.settings.machine import describe_pose
 from motionserver.settings.resolve import resolve
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
+from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.requests import RequestError, ask
 from motionserver.telemetry.ticker import now_ns
-
-SILENT_NS = 2_000_000_000
-"""Age of the guard's last word beyond which nobody runs [ns]."""
 
 
 class NotRunningError(MotionServerError):

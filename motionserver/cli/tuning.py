@@ -9,7 +9,7 @@ from typing import Any
 
 import typer
 
-from motionserver.errors import ConfigError
+from motionserver.evaluate.options import head_point
 from motionserver.evaluate.tune.command import tune
 from motionserver.evaluate.tune.predictor import tune_predictor, worth
 from motionserver.evaluate.tune.tables import verdict
@@ -54,7 +54,7 @@ class ProgressBar:
 def run_tune(recordings: list[Path], out: Path, head: str, **options: Any) -> int:  # noqa: ANN401
     """Search, write, and say what was found; 1 if a choice broke a limit on a held-out drive."""
     with ProgressBar() as progress:
-        result = tune(recordings, out=out, head=_point(head), progress=progress, **options)
+        result = tune(recordings, out=out, head=head_point(head), progress=progress, **options)
     sys.stdout.write("\n".join([*verdict(result), f"written to {out}"]) + "\n")
     return 0 if result.held_out_violations == 0 else 1
 
@@ -64,15 +64,3 @@ def run_predictor(recordings: list[Path], name: str, out: Path) -> int:
     predictor = tune_predictor(recordings, name, out)
     sys.stdout.write("\n".join([*worth(predictor), f"written to {out}"]) + "\n")
     return 0
-
-
-def _point(text: str) -> tuple[float, float, float] | None:
-    if not text:
-        return None
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise ConfigError("--head", f"{text!r} is no point", "Give X,Y,Z in metres.") from None
-    if not all(abs(part) <= 10.0 for part in (x, y, z)):
-        raise ConfigError("--head", f"{text!r} is out of range", "Give at most 10 m.")
-    return x, y, z

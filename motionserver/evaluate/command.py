@@ -9,16 +9,16 @@ from pathlib import Path
 from time import perf_counter
 
 from motionserver.core.limits import Machine
-from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ, Drive, no_motion
-from motionserver.evaluate.hearing import LONGEST_PREVIEW
+from motionserver.evaluate.files import check_file
 from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.page import to_html
+from motionserver.evaluate.ranges import check_algorithms, check_scale, check_times
 from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.result import EvaluateResult, to_json
 from motionserver.evaluate.setpoints import write_setpoints
@@ -74,13 +74,17 @@ def evaluate(
     machine = load_machine("t2-compact") if machine is None else machine
     base = tuning or Tuning()
     base = base if scale is None else replace(base, scale=scale)
-    _check(algorithms, base.scale, rate, planner_hz, setpoints)
-    if not 0.0 <= preview <= LONGEST_PREVIEW:
+    check_algorithms(algorithms)
+    check_scale(base.scale)
+    check_times(rate, planner_hz, preview)
+    if setpoints is not None and len(algorithms) != 1:
         raise ConfigError(
-            "--preview", f"{preview:g} s is out of range", f"Give 0 to {LONGEST_PREVIEW:g} s."
+            "--setpoints",
+            f"one algorithm moves one platform; {len(algorithms)} are given",
+            "Give exactly one name to --algorithm.",
         )
     for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
-        _check_folder(option, path)
+        check_file(option, path)
     recording = read_recording(input_csv)
 
     def tell(text: str) -> None:
@@ -130,46 +134,3 @@ def evaluate(
     if html_out is not None:
         Path(html_out).write_text(to_html(result), encoding="utf-8")
     return result
-
-
-def _check(
-    algorithms: Sequence[str],
-    scale: float,
-    rate: float,
-    planner_hz: float,
-    setpoints: str | Path | None,
-) -> None:
-    known = known_algorithms()
-    for name in algorithms:
-        if name not in known:
-            raise ConfigError(
-                "--algorithm", f"unknown algorithm {name!r}", f"Allowed: {', '.join(known)}."
-            )
-    if not algorithms or len(set(algorithms)) < len(algorithms):
-        raise ConfigError(
-            "--algorithm",
-            f"{len(algorithms)} given, each may stand once and one is needed",
-            f"Give one or more of {', '.join(known)}, separated by commas.",
-        )
-    if not 0.0 < scale <= 1.0:
-        raise ConfigError("--scale", f"{scale:g} is out of range", "Give a share in (0, 1].")
-    if not 10.0 <= rate <= 2000.0:
-        raise ConfigError("--rate", f"{rate:g} Hz is out of range", "Give 10 to 2000 Hz.")
-    if not 20.0 <= planner_hz <= 250.0:
-        raise ConfigError(
-            "--planner-rate", f"{planner_hz:g} Hz is out of range", "Give 20 to 250 Hz."
-        )
-    if setpoints is not None and len(algorithms) != 1:
-        raise ConfigError(
-            "--setpoints",
-            f"one algorithm moves one platform; {len(algorithms)} are given",
-            "Give exactly one name to --algorithm.",
-        )
-
-
-def _check_folder(option: str, path: str | Path | None) -> None:
-    """Refuse before minutes of work what could not be written after them."""
-    if path is not None and (not Path(path).parent.is_dir() or Path(path).is_dir()):
-        raise ConfigError(
-            f"{option} {path}", "is no file in an existing folder", "Name a file to write."
-        )

@@ -17,6 +17,7 @@ from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ
 from motionserver.evaluate.lockstep import PLANNER_HZ
+from motionserver.evaluate.ranges import check_scale, check_times
 from motionserver.settings.fields import TuningError
 from motionserver.settings.machine import load_machine
 from motionserver.settings.tuning import apply_changes, default_for
@@ -25,6 +26,7 @@ from motionserver.settings.tuning_presets import NAME, PresetShelf
 FREE_DEG_S: Final = 1000.0
 """The tilt rate that is called "free" [deg/s]."""
 _FARTHEST: Final = 3.0
+"""Of a head from the reference point, along each axis [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,9 @@ class EvaluateOptions:
         setpoints: File for set-points, or None.
         json_out: File for figures, or None.
         html_out: File for the page, or None.
+
+    Raises:
+        ConfigError: A rate or the preview is out of range.
     """
 
     algorithm: str
@@ -69,6 +74,9 @@ class EvaluateOptions:
     setpoints: Path | None = None
     json_out: Path | None = None
     html_out: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_times(self.rate, self.planner_hz, self.preview)
 
     def algorithms(self) -> list[str]:
         """Names of algorithms."""
@@ -93,20 +101,29 @@ def machine_at(machine: Machine, head: str) -> Machine:
     Raises:
         ConfigError: These are not three numbers of a head.
     """
-    if not head:
-        return machine
-    parts = head.split(",")
+    point = head_point(head)
+    return machine if point is None else machine.with_head(np.array(point))
+
+
+def head_point(text: str) -> tuple[float, float, float] | None:
+    """The head point of ``X,Y,Z`` [m]; None if empty.
+
+    Raises:
+        ConfigError: These are not three numbers of a head.
+    """
+    if not text:
+        return None
     try:
-        point = [float(part) for part in parts]
+        x, y, z = (float(part) for part in text.split(","))
+        if all(abs(value) <= _FARTHEST for value in (x, y, z)):
+            return x, y, z
     except ValueError:
-        point = []
-    if len(point) != 3 or not all(abs(value) <= _FARTHEST for value in point):
-        raise ConfigError(
-            "--head",
-            f"{head!r} is not X,Y,Z of the driver's head from the reference point",
-            f"Give three numbers in metres, each at most {_FARTHEST:g}, for example 0,0,0.7.",
-        )
-    return machine.with_head(np.array(point))
+        pass
+    raise ConfigError(
+        "--head",
+        f"{text!r} is not X,Y,Z of the driver's head from the reference point",
+        f"Give three numbers in metres, each at most {_FARTHEST:g}, for example 0,0,0.7.",
+    )
 
 
 def tuning_from(
@@ -145,7 +162,10 @@ def tuning_from(
     tuning = model.to_tuning()
     if tilt_rate:
         tuning = replace(tuning, tilt_rate=_rate(tilt_rate))
-    return tuning if scale is None else replace(tuning, scale=scale)
+    if scale is None:
+        return tuning
+    check_scale(scale)
+    return replace(tuning, scale=scale)
 
 
 def _rate(text: str) -> float:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from html import escape
 from math import degrees
-from typing import Final
 
 import numpy as np
 
 from motionserver import __version__
-from motionserver.core.axes import Axis
+from motionserver.core.axes import Array, Axis
 from motionserver.evaluate.drive import Drive
 from motionserver.evaluate.hindsight import HINDSIGHT_RULE
+from motionserver.evaluate.html import STYLE, cards, document
 from motionserver.evaluate.metrics.comfort import tilt_rate
 from motionserver.evaluate.report import remarks
 from motionserver.evaluate.result import EvaluateResult
@@ -20,33 +20,7 @@ from motionserver.evaluate.svg import STYLE as PLOT_STYLE
 from motionserver.evaluate.svg import Curve, Panel, figure
 from motionserver.evaluate.yardstick import RULE
 
-STYLE: Final = """
-:root{color-scheme:light dark;--paper:#fbfbfa;--card:#fff;--ink:#1d2430;--soft:#667085;
---line:#e3e6ea;--bad:#c8372d;--good:#12805c;--c0:#98a1b0;--c1:#2563c9;--c2:#d9730d;--c3:#159a6b;
---c4:#8b4fc4;--c5:#c2417c}
-@media(prefers-color-scheme:dark){:root{--paper:#14171c;--card:#1b1f26;--ink:#e7eaf0;--soft:#98a2b3;
---line:#2c323c;--bad:#f0685e;--good:#4cc38a;--c0:#7f8a9c;--c1:#6ea8fe;--c2:#f5a04c;--c3:#4cc38a;
---c4:#b794f4;--c5:#f28fb5}}
-*{box-sizing:border-box}
-body{margin:0 auto;max-width:1060px;padding:32px 24px 64px;background:var(--paper);color:var(--ink);
-font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
-h1{font-size:26px;line-height:1.2;margin:0 0 4px}h2{font-size:18px;margin:40px 0 12px}
-p{margin:6px 0}.soft{color:var(--soft)}code{font:13px ui-monospace,monospace}
-.cards{display:flex;flex-wrap:wrap;gap:12px;margin:20px 0}
-.card{flex:1 1 150px;background:var(--card);border:1px solid var(--line);border-radius:10px;
-padding:12px 16px}.card b{display:block;font-size:26px;line-height:1.25;font-weight:650;
-font-variant-numeric:tabular-nums}.card span{color:var(--soft);font-size:13px}
-.good b{color:var(--good)}.poor b{color:var(--bad)}
-.frame{background:var(--card);border:1px solid var(--line);border-radius:10px;padding:10px 12px;
-margin:0 0 16px;overflow-x:auto}
-table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
-th,td{padding:4px 12px;text-align:right;white-space:nowrap}
-th:first-child,td:first-child{text-align:left;white-space:normal}
-thead th{border-bottom:1px solid var(--line);font-size:13px}
-tbody tr+tr td{border-top:1px solid var(--line)}
-tbody th{padding-top:18px;font-size:13px;color:var(--soft);text-transform:none;text-align:left}
-td.best{font-weight:700}td.bad{color:var(--bad);font-weight:700}
-"""
+__all__ = ["STYLE", "to_html"]
 
 
 def to_html(result: EvaluateResult) -> str:
@@ -63,22 +37,21 @@ def to_html(result: EvaluateResult) -> str:
         for name, panels in _plots(result)
     )
     notes = "".join(f"<p>{escape(line)}.</p>" for line in remarks(result))
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{PLOT_STYLE}</style></head><body>"
-        f'<h1>{escape(title)}</h1><p class="soft">{facts}</p>{_cards(result)}{notes}'
+    return document(
+        title,
+        PLOT_STYLE,
+        f'<p class="soft">{facts}</p>{_cards(result)}{notes}'
         f'<p class="soft">Yardstick: {escape(RULE)}. Its gain here: '
         f"{result.yardstick.gain:g}.</p>"
         f'<p class="soft">Hindsight: {escape(HINDSIGHT_RULE)}. Here: '
         f"{escape(result.hindsight.described())}.</p>{plots}<h2>All figures</h2>"
-        f'<div class="frame">{_table(result)}</div></body></html>\n'
+        f'<div class="frame">{_table(result)}</div>',
     )
 
 
 def _cards(result: EvaluateResult) -> str:
     still = result.of("no motion").rmse_xy
-    cards = [
+    shown = [
         (
             f"{result.violations}",
             "samples beyond a limit",
@@ -87,7 +60,7 @@ def _cards(result: EvaluateResult) -> str:
     ]
     for figures in result.figures:
         if figures.name == "no motion":
-            cards.append((f"{figures.rmse_xy:.3f}", "RMSE(x, y) of no motion [m/s²]", ""))
+            shown.append((f"{figures.rmse_xy:.3f}", "RMSE(x, y) of no motion [m/s²]", ""))
         else:
             name = (
                 figures.name
@@ -95,21 +68,14 @@ def _cards(result: EvaluateResult) -> str:
                 else (f"yardstick (gain {result.yardstick.gain:g})")
             )
             won = 100.0 * (1.0 - figures.rmse_xy / still) if still > 0.0 else 0.0
-            cards.append(
+            shown.append(
                 (
                     f"{figures.rmse_xy:.3f}",
                     f"RMSE(x, y) of {name}: {won:+.0f} % felt error saved",
                     "",
                 )
             )
-    return (
-        '<div class="cards">'
-        + "".join(
-            f'<div class="card {kind}"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
-            for value, text, kind in cards
-        )
-        + "</div>"
-    )
+    return cards(shown)
 
 
 def _table(result: EvaluateResult) -> str:
@@ -144,14 +110,21 @@ def _moves(curves: list[Curve]) -> bool:
     return any(float(np.max(np.abs(curve.values))) > 1e-6 for curve in curves)
 
 
+def _beside(movers: list[Drive], values: list[Array]) -> list[Curve]:
+    """One curve of every drive, each with its colour, the first on top."""
+    curves = [
+        Curve(drive.name, each, 1 + i % 5)
+        for i, (drive, each) in enumerate(zip(movers, values, strict=True))
+    ]
+    return curves[::-1]
+
+
 def _force_panels(movers: list[Drive]) -> list[Panel]:
     panels = []
+    felt = [drive.felt() for drive in movers]
     for axis, name in enumerate(("f_x, forward", "f_y, left", "f_z, up, gravity removed")):
         curves = [Curve("wanted", movers[0].wanted_force[:, axis], 0)]
-        curves += [
-            Curve(d.name, d.felt()[0][:, axis], 1 + i % 5)
-            for i, d in reversed([*enumerate(movers)])
-        ]
+        curves += _beside(movers, [force[:, axis] for force, _ in felt])
         if _moves(curves):
             panels.append(Panel(f"{name} [m/s²]", movers[0].times, curves, height=220))
     return panels
@@ -159,18 +132,15 @@ def _force_panels(movers: list[Drive]) -> list[Panel]:
 
 def _rate_panels(movers: list[Drive]) -> list[Panel]:
     panels = []
+    felt = [drive.felt() for drive in movers]
     for axis, name in enumerate(("roll rate", "pitch rate", "yaw rate")):
         curves = [Curve("wanted", np.degrees(movers[0].wanted_rates[:, axis]), 0)]
-        curves += [
-            Curve(d.name, np.degrees(d.felt()[1][:, axis]), 1 + i % 5)
-            for i, d in reversed([*enumerate(movers)])
-        ]
+        curves += _beside(movers, [np.degrees(rates[:, axis]) for _, rates in felt])
         if _moves(curves):
             panels.append(Panel(f"{name} [deg/s]", movers[0].times, curves, height=170))
-    tilting = [
-        Curve(d.name, np.degrees(tilt_rate(d.wanted_rates, d.felt()[1])), 1 + i % 5)
-        for i, d in reversed([*enumerate(movers)])
-    ]
+    rates_of = zip(movers, felt, strict=True)
+    tilts = [np.degrees(tilt_rate(drive.wanted_rates, rates)) for drive, (_, rates) in rates_of]
+    tilting = _beside(movers, tilts)
     panels.append(
         Panel("tilt rate nobody asked for [deg/s]", movers[0].times, tilting, limits=(3.0,))
     )

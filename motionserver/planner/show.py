@@ -15,11 +15,13 @@ from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
 from motionserver.planner.inputs import Inputs
 from motionserver.planner.sides import Sides
+from motionserver.planner.spare_time import KEPT, expected_ns
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.ticker import Lateness
 from motionserver.telemetry.trace import Trace
 
 GUESS_NS: Final = 5_000_000
+"""How long the first plan will take [ns]."""
 
 
 class Timing:
@@ -28,7 +30,6 @@ class Timing:
     def __init__(self, period_ns: int) -> None:
         self.lateness = Lateness(period_ns)
         self._thoughts: deque[int] = deque(maxlen=1024)
-        self._wakes: deque[int] = deque(maxlen=64)
 
     def woke(self, late_ns: int) -> None:
         """Note a wake-up."""
@@ -41,8 +42,7 @@ class Timing:
     @property
     def expected_ns(self) -> int:
         """How long the next plan will take, on the careful side [ns]."""
-        recent = sorted(list(self._thoughts)[-100:])
-        return recent[int(0.95 * (len(recent) - 1))] if recent else GUESS_NS
+        return expected_ns(list(self._thoughts)[-KEPT:], GUESS_NS)
 
     def summary(self) -> dict[str, float]:
         """Percentiles of plan times [ms]."""

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from typing import Final
 
 GUESS_NS: Final = 4_000_000
 """How long something takes that has not been measured yet [ns]."""
 KEPT: Final = 100
+"""How many of the newest measurements count."""
+CAREFUL: Final = 0.95
+"""Percentile that is expected: on the careful side, but not the one stall in a hundred."""
 PATIENCE_NS: Final = 20_000_000_000
 """How long something that took too long is left alone before it is tried again [ns]."""
 LONGEST_NS: Final = 640_000_000_000
 """Longest such wait: it doubles with every vain trial [ns]."""
+
+
+def expected_ns(newest: Iterable[int], guess_ns: int) -> int:
+    """How long something takes, on the careful side, or the guess if nothing is measured [ns]."""
+    times = sorted(newest)
+    return times[int(CAREFUL * (len(times) - 1))] if times else guess_ns
 
 
 class Cost:
@@ -30,9 +40,7 @@ class Cost:
     @property
     def expected_ns(self) -> int:
         """95th percentile of what was measured [ns]."""
-        if not self._times:
-            return GUESS_NS
-        return sorted(self._times)[int(0.95 * (len(self._times) - 1))]
+        return expected_ns(self._times, GUESS_NS)
 
     def fits(self, now_ns: int, left_ns: int) -> bool:
         """Whether it may begin with ``left_ns`` [ns] to go."""

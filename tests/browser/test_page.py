@@ -233,6 +233,46 @@ def test_silence_is_said_and_ends_by_itself(site, visit):
     one.expect("#link", "live")
 
 
+def test_a_page_older_than_its_planner_gets_its_forms_by_itself(site, visit):
+    one = visit()
+    absent = {"status": 503, "json": {"error": "the planner does not answer"}}
+    for path in ("**/api/tuning", "**/api/side"):
+        one.page.route(path, lambda route: route.fulfill(**absent))
+    one.page.reload()
+    one.expect("#tuning-answer", "the planner does not answer")
+    one.page.unroute_all()
+    one.page.wait_for_selector("#engines .engine")
+    one.page.wait_for_selector("#tune-scale", state="attached")
+    one.expect("#version", "version 1")
+    assert one.value("scale") == "0.6"
+
+
+def test_dragging_ends_when_the_browser_takes_the_pointer(site, visit):
+    one = visit()
+    one.expect("#link", "live")
+    assert one.page.evaluate(
+        """() => {
+          const canvas = document.getElementById("hexapod");
+          let taken = 0;
+          canvas.setPointerCapture = () => { taken += 1; };
+          const send = (type, x) => canvas.dispatchEvent(
+            new PointerEvent(type, { pointerId: 1, clientX: x, clientY: 0 }));
+          const seen = [];
+          const context = canvas.getContext("2d");
+          return import("/static/hexapod.js").then(({ Hexapod }) => {
+            const view = new Hexapod(canvas);
+            send("pointerdown", 0);
+            send("pointermove", 10);
+            seen.push(view.turn);
+            send("lostpointercapture", 10);
+            send("pointermove", 50);
+            seen.push(view.turn);
+            return taken > 0 && seen[0] < 0.5 && seen[1] === seen[0];
+          });
+        }"""
+    )
+
+
 def test_hostile_text_is_shown_as_text(site, visit):
     hostile = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     site.scene.put("PARKED", hostile)

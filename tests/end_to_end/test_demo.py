@@ -40,3 +40,14 @@ def test_what_the_demo_does_not_know(wrong: tuple[str, str]) -> None:
     ended = cli("demo", *wrong)
     assert ended.returncode == 2
     assert ended.stderr.startswith(f"motionserver: {wrong[0]}: unknown")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [("--json", "/nowhere/verdict.json", "existing folder"), ("--seconds", "-1", "positive")],
+)
+def test_what_the_demo_cannot_do_is_said_before_it_starts(wrong: tuple[str, str, str]) -> None:
+    ended = cli("demo", "--no-page", *wrong[:2])
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.startswith(f"motionserver: {wrong[0]}")
+    assert wrong[2] in ended.stderr

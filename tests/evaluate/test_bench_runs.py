@@ -2,12 +2,15 @@
 
 import json
 import math
+import socket
+import subprocess
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motionserver.errors import ConfigError
 from motionserver.evaluate.bench import command
 from motionserver.evaluate.bench.latency import ages, bench_latency, first_changes, loopback_floor
 from motionserver.evaluate.bench.loop import bench_loop
@@ -22,9 +25,10 @@ from motionserver.evaluate.bench.plan import (
 from motionserver.evaluate.bench.plan_accuracy import accuracy_text, measure_accuracy
 from motionserver.evaluate.bench.plan_growth import exponent_of, growth_text, measure_growth
 from motionserver.evaluate.bench.plan_steps import LIVELY, time_plans
-from motionserver.evaluate.bench.processes import BenchError, Helper
+from motionserver.evaluate.bench.processes import BenchError, Helper, free_port
 from motionserver.evaluate.bench.report import row_of_samples
 from motionserver.evaluate.bench.sentinel import Sentinel
+from motionserver.evaluate.bench.server import BenchServer
 from motionserver.settings.machine import load_machine
 
 MS = 1_000_000
@@ -49,6 +53,21 @@ def test_a_process_that_says_nothing_is_an_error(capfd):
     with helper, pytest.raises(BenchError, match="said nothing"):
         helper.line()
     assert "ValueError" in capfd.readouterr().err
+
+
+def test_a_server_that_fell_is_said_with_the_end_of_its_log(tmp_path):
+    server = BenchServer(60.0, realtime=False)
+    (tmp_path / "server.log").write_text("the last word\n")
+    port = str(free_port(socket.SOCK_DGRAM))
+    base = Helper("motionserver.evaluate.bench.base", port, "60", str(tmp_path / "base.log"))
+    fallen = Helper("motionserver", "no-such-command", stderr=subprocess.DEVNULL)
+    with base, fallen:
+        base.line()
+        fallen.process.wait()
+        server._folder, server._base, server._server = tmp_path, base, fallen
+        with pytest.raises(BenchError, match=r"ended by itself, status 2(?s:.*)the last word"):
+            server.stop()
+    assert server.verdict["violations"] == 0
 
 
 @pytest.mark.timeout(240)
@@ -191,7 +210,22 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys, monkeypatch):
     assert asked[-1] == PlanBench(50, only="classical")
 
 
-@pytest.mark.parametrize(("what", "seconds", "ticks"), [("everything", 1.0, 5), ("plan", 1.0, 0)])
-def test_the_command_refuses_what_it_cannot_do(what, seconds, ticks):
-    with pytest.raises(ValueError, match="allowed are loop, plan, latency or all"):
+@pytest.mark.parametrize(
+    ("what", "seconds", "ticks", "message"),
+    [
+        ("everything", 1.0, 5, "bench: unknown 'everything'. Allowed: loop, plan, latency, all"),
+        ("plan", 1.0, 0, "--ticks: 0 is out of range. Give 1 to 360000"),
+        ("plan", 1.0, 10**6, "--ticks"),
+        ("loop", 0.0, None, "--seconds: 0 s is out of range. Give 0.01 to 3600 s"),
+        ("loop", math.nan, None, "--seconds"),
+    ],
+)
+def test_the_command_refuses_what_it_cannot_do(what, seconds, ticks, message):
+    with pytest.raises(ConfigError, match=message):
         command.run_bench(what, seconds, None, ticks)
+
+
+def test_figures_that_could_not_be_written_are_not_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "bench_plan", lambda _: pytest.fail("measured"))
+    with pytest.raises(ConfigError, match=r"--json .*no file in an existing folder"):
+        command.run_bench("plan", 1.0, tmp_path / "nowhere" / "out.json")

@@ -13,6 +13,7 @@ from motionserver.core.axes import GRAVITY
 from motionserver.cueing.classical import REID_NAHON
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
+from motionserver.evaluate.omct import command
 from motionserver.evaluate.omct.boundaries import read_boundaries
 from motionserver.evaluate.omct.command import omct
 from motionserver.evaluate.omct.run import Point, Response, run_omct
@@ -145,6 +146,9 @@ def test_files_hold_everything_and_boundaries_mark(tmp_path):
         ("[[boundary]]\ntest = 1\nomega = [1.0]\ngain_low = [1.0, 2.0]", "one length"),
         ("[[boundary]]\ntest = 1\nomega = [1.0]\ngain_low = [nan]", "lists of numbers"),
         ("[[bound", "cannot be read"),
+        ("boundary = [1]", "boundary holds 1"),
+        ("[[boundary]]\ntest = true\nomega = [1.0]", "1 to 10"),
+        ("[[boundary]]\ntest = 2\nomega = [1.0]\n" * 2, "test 2 has two tables"),
     ],
 )
 def test_senseless_boundaries_are_refused(text, message, tmp_path):
@@ -156,8 +160,19 @@ def test_senseless_boundaries_are_refused(text, message, tmp_path):
 
 @pytest.mark.parametrize(
     ("change", "amplitude", "message"),
-    [({"algorithm": "classic"}, 1.0, "--algorithm"), ({}, 0.0, "--amplitude")],
+    [
+        ({"algorithm": "classic"}, 1.0, "--algorithm"),
+        ({"algorithm": "classical,classical"}, 1.0, "may stand once"),
+        ({}, 0.0, "--amplitude"),
+    ],
 )
 def test_wrong_arguments_of_omct_are_refused(change, amplitude, message, tmp_path):
     with pytest.raises(ConfigError, match=message):
         omct(tmp_path, replace(EvaluateOptions("classical"), **change), amplitude, None)
+
+
+def test_a_folder_that_cannot_be_is_refused_before_anything_is_driven(tmp_path, monkeypatch):
+    monkeypatch.setattr(command, "run_omct", lambda *_, **__: pytest.fail("driven"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="--out"):
+        omct(tmp_path / "file", EvaluateOptions("classical"), 1.0, None)

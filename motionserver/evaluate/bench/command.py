@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+from motionserver.errors import ConfigError
 from motionserver.evaluate.bench.latency import bench_latency
 from motionserver.evaluate.bench.loop import bench_loop
 from motionserver.evaluate.bench.plan import PlanBench, backends, bench_plan, headline
@@ -15,9 +16,11 @@ from motionserver.evaluate.bench.plan_accuracy import accuracy_text, bench_accur
 from motionserver.evaluate.bench.plan_growth import bench_growth, growth_text
 from motionserver.evaluate.bench.plan_steps import PERIOD
 from motionserver.evaluate.bench.report import Row, describe_machine, machine_text, table_text
+from motionserver.evaluate.files import check_file
 
 WHATS: Final = ("loop", "plan", "latency")
 _MOST: Final = 3600.0
+"""Longest stretch [s]."""
 
 
 def run_bench(
@@ -43,14 +46,19 @@ def run_bench(
 
     Raises:
         BenchError: A benchmark could not be carried out.
-        ValueError: ``what`` is none of these, or the length is not positive.
+        ConfigError: An argument is wrong.
     """
-    count = round(seconds / PERIOD) if ticks is None else ticks
-    if what not in (*WHATS, "all") or not 0.0 < seconds <= _MOST or not 0 < count * PERIOD <= _MOST:
-        raise ValueError(
-            f"bench: {what!r} for {seconds:g} s or {count} ticks is not possible; "
-            f"allowed are {', '.join(WHATS)} or all, for up to {_MOST:g} s"
+    if what not in (*WHATS, "all"):
+        raise ConfigError("bench", f"unknown {what!r}", f"Allowed: {', '.join(WHATS)}, all.")
+    if not PERIOD <= seconds <= _MOST:
+        raise ConfigError(
+            "--seconds", f"{seconds:g} s is out of range", f"Give {PERIOD:g} to {_MOST:g} s."
         )
+    count = round(seconds / PERIOD) if ticks is None else ticks
+    most = round(_MOST / PERIOD)
+    if not 0 < count <= most:
+        raise ConfigError("--ticks", f"{count} is out of range", f"Give 1 to {most}.")
+    check_file("--json", json_out)
     machine = describe_machine()
     _tell(machine_text(machine))
     out: dict[str, Any] = {"machine": machine, "seconds": seconds}

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import random
 import socket
 import tempfile
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -20,86 +18,23 @@ from typing import Final
 import numpy as np
 from motion_clients.moog_wire import COMMAND_SIZE, Mcw, decode_command
 from motion_clients.motion_log import read_motion_log
-from motion_protocol import Cue, Motion, encode_cue
 
 from motionserver.core.axes import Array
 from motionserver.evaluate.bench.processes import BenchError, Helper, free_port
 from motionserver.evaluate.bench.report import Row, row_of_samples
 from motionserver.evaluate.bench.sentinel import Sentinel
 from motionserver.evaluate.bench.server import OTHERS_PRIORITY, BenchServer
+from motionserver.evaluate.bench.step_sender import StepSender
 
-CUE_PERIOD: Final = 0.01
-STEP: Final = 2.0
-"""Size of a step of acceleration [m/s2]."""
-HOLD: Final = (0.3, 0.5)
-"""A step is held this long, evenly at random [s]: the phase against the base's frames is too."""
 PATIENCE: Final = 0.2
 """A step that shows later than this is counted as unseen [s]."""
 _BEFORE: Final = 8
+"""Set-points before a step that tell how uneven the motion is anyway."""
 _FLOOR: Final = 2e-6
+"""Least kink of a leg that is one, above the rounding of the words [m]."""
 _ABOVE: Final = 2.0
 _SETTLE: Final = 2.0
-
-
-class StepSender:
-    """Sends cues a hundred times a second, and steps between them.
-
-    Attributes:
-        sent_ns: When each packet was sent [ns].
-        steps_ns: When each step was [ns].
-    """
-
-    def __init__(self, port: int, seed: int = 1) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        # not connected: a planner that is still starting refuses nothing
-        self._peer = ("127.0.0.1", port)
-        self._random = random.Random(seed)
-        self._start_ns = time.monotonic_ns()
-        self._level = 0.0
-        self.sent_ns: list[int] = []
-        self.steps_ns: list[int] = []
-        self.by_bytes: dict[bytes, int] = {}
-
-    def send(self) -> int:
-        """Send one cue now.
-
-        Returns:
-            When [ns].
-        """
-        now = time.monotonic_ns()
-        motion = Motion((self._level, 0.0, 0.0), (0.0, 0.0, 0.0))
-        cue = Cue(7, len(self.sent_ns), now - self._start_ns, now, motion)
-        data = encode_cue(cue)
-        now = time.monotonic_ns()
-        self._socket.sendto(data, self._peer)
-        self.sent_ns.append(now)
-        self.by_bytes[data] = now
-        return now
-
-    def hold(self, seconds: float) -> None:
-        """Go on with the same cue for ``seconds`` [s]."""
-        end = time.monotonic() + seconds
-        due = self.sent_ns[-1] * 1e-9 if self.sent_ns else time.monotonic()
-        while (due := due + CUE_PERIOD) < end:
-            time.sleep(max(0.0, due - time.monotonic()))
-            self.send()
-        time.sleep(max(0.0, end - time.monotonic()))
-
-    def step(self) -> None:
-        """Change the acceleration at once; the grid of packets begins anew there."""
-        self._level = STEP - self._level
-        self.steps_ns.append(self.send())
-
-    def drive(self, seconds: float) -> None:
-        """Steps at random instants for ``seconds`` [s]."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self.step()
-            self.hold(self._random.uniform(*HOLD))
-
-    def close(self) -> None:
-        """Stop."""
-        self._socket.close()
+"""Cues before the first step [s]."""
 
 
 def first_changes(arrivals_ns: Array, legs: Array, steps_ns: Sequence[int]) -> list[int | None]:

@@ -111,7 +111,7 @@ class Beside:
             one.adopt(plan, kappa)
 
     def retune(self, tuning: Tuning) -> None:
-        """Everybody's, each with its own backend: not needed here."""
+        """Refused: each has its own backend, and a benchmark's drive is not tuned."""
         raise NotImplementedError("the drive of a benchmark is not tuned")
 
     def report(self) -> Report:
@@ -173,7 +173,7 @@ def accuracy_text(found: Sequence[dict[str, Any]]) -> str:
         if "excess" in one:
             moves = [one[f"first_move_{cut}"] for cut in ("p50", "p99", "max")]
             line += f"{one['excess']:9.2%}{moves[0]:16.1e}{moves[1]:9.1e}{moves[2]:9.1e}"
-            line += "" if one["within_bar"] else "  beyond 1 %"
+            line += "" if one["within_bar"] else f"  beyond {100 * BAR:g} %"
         lines.append(line)
     return "\n".join(lines)
 

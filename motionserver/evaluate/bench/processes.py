@@ -120,10 +120,13 @@ def say(message: object) -> None:
     sys.stdout.flush()
 
 
-def free_port(kind: socket.SocketKind) -> int:
-    """A port of 127.0.0.1 that nobody holds now."""
+def free_port(kind: socket.SocketKind, wanted: int = 0) -> int:
+    """A port of 127.0.0.1 that nobody holds now: the wanted one, if that is free."""
     with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
+        try:
+            probe.bind(("127.0.0.1", wanted))
+        except OSError:
+            probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
         return port
 

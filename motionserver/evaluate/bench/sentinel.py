@@ -7,14 +7,14 @@ Run as ``python -m motionserver.evaluate.bench.sentinel PERIOD_NS SECONDS PRIORI
 from __future__ import annotations
 
 import asyncio
-import gc
 import sys
+from collections.abc import Mapping
 from typing import Self
 
 from motionserver.evaluate.bench.processes import Helper, say
+from motionserver.evaluate.bench.quiet import quiet
 from motionserver.evaluate.bench.report import Row, row_of_histogram
 from motionserver.telemetry.histogram import Histogram
-from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
 
 
@@ -55,21 +55,16 @@ class Sentinel(Helper):
         return row_of_histogram(name, counted, missed=seen["missed"], scheduling=seen["scheduling"])
 
 
-async def sleep_on_grid(period_ns: int, seconds: float, priority: int) -> dict[str, object]:
+async def sleep_on_grid(period_ns: int, seconds: float) -> Mapping[str, object]:
     """Tick and do nothing.
 
     Args:
         period_ns: Of the grid [ns].
         seconds: How long [s].
-        priority: For SCHED_FIFO; 0 asks for none.
 
     Returns:
-        The summary of its lateness, with what scheduling was granted.
+        The summary of its lateness.
     """
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    scheduling = take_priority(max(priority, 1), priority > 0)
     lateness = Lateness(period_ns)
     done = asyncio.get_running_loop().create_future()
     start_ns = now_ns()
@@ -89,7 +84,7 @@ async def sleep_on_grid(period_ns: int, seconds: float, priority: int) -> dict[s
     ticker.arm(start_ns + period_ns)
     await done
     ticker.close()
-    return {**lateness.summary(), "scheduling": scheduling}
+    return lateness.summary()
 
 
 def main(arguments: list[str]) -> int:
@@ -97,7 +92,9 @@ def main(arguments: list[str]) -> int:
     period_ns, seconds, priority = int(arguments[0]), float(arguments[1]), int(arguments[2])
     say("ready")
     sys.stdin.readline()
-    say(asyncio.run(sleep_on_grid(period_ns, seconds, priority)))
+    with quiet(priority) as scheduling:
+        late = asyncio.run(sleep_on_grid(period_ns, seconds))
+    say({**late, "scheduling": scheduling})
     return 0
 
 

@@ -23,8 +23,8 @@ RAISING: Final = 30.0
 """Longest wait for the platform to run [s]."""
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
-
 FASTEST_PLANNER_HZ: Final = 120.0
+"""What ``rate_max_hz`` of its configuration says [Hz]."""
 OTHERS_PRIORITY: Final = 20
 """For SCHED_FIFO of base and simulator, if permitted: they have computers of their own."""
 
@@ -86,11 +86,19 @@ class BenchServer:
                 self.stop()
 
     def stop(self) -> None:
-        """Park, end, and hear the judge; what was logged stays until the context is left."""
-        if self._server.process.poll() is None:
-            self._server.end(PARKING)
-            self._base.process.terminate()
-            self.verdict = self._base.result()
+        """Park, end, and hear the judge; what was logged stays until the context is left.
+
+        Raises:
+            BenchError: The server had ended by itself: what was measured was no server.
+        """
+        if self.verdict:
+            return
+        fallen = self._server.process.poll()
+        self._server.end(PARKING)
+        self._base.process.terminate()
+        self.verdict = self._base.result()
+        if fallen is not None:
+            raise BenchError(f"bench: the server ended by itself, status {fallen}; {self._tail()}")
 
     def replay(self, recording: str) -> Helper:
         """Send a recording round and round, as a simulator would; end it yourself."""

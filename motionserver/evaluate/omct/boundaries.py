@@ -88,13 +88,22 @@ def read_boundaries(path: Path) -> Boundaries:
     rows = data.get("boundary")
     if not isinstance(rows, list) or not rows:
         raise ConfigError(where, "has no [[boundary]]", "Write one table for each test.")
-    found = [_boundary(where, row) for row in rows]
-    return Boundaries(str(data.get("source", path.name)), {each.test: each for each in found})
+    tests: dict[int, Boundary] = {}
+    for row in rows:
+        found = _boundary(where, row)
+        if found.test in tests:
+            raise ConfigError(
+                where, f"test {found.test} has two tables", "Write one table for each test."
+            )
+        tests[found.test] = found
+    return Boundaries(str(data.get("source", path.name)), tests)
 
 
-def _boundary(where: str, row: dict[str, Any]) -> Boundary:
+def _boundary(where: str, row: Any) -> Boundary:  # noqa: ANN401  (whatever the file holds)
+    if not isinstance(row, dict):
+        raise ConfigError(where, f"boundary holds {row!r}", "Write [[boundary]] tables.")
     number = row.get("test")
-    if not isinstance(number, int) or not 1 <= number <= 10:
+    if type(number) is not int or not 1 <= number <= 10:
         raise ConfigError(where, f"test = {number!r}", "Give a whole number from 1 to 10.")
     unknown = sorted(set(row) - {"test", "omega", *_LISTS})
     if unknown:

@@ -7,14 +7,15 @@ import sys
 from math import degrees
 from pathlib import Path
 
-from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.omct.boundaries import read_boundaries
 from motionserver.evaluate.omct.page import to_html
 from motionserver.evaluate.omct.report import conditions, to_mapping, to_text
 from motionserver.evaluate.omct.run import RATE_HZ, SLOW, run_omct
 from motionserver.evaluate.omct.sines import FREQUENCIES
 from motionserver.evaluate.options import EvaluateOptions
+from motionserver.evaluate.ranges import check_algorithms
 
 
 def omct(
@@ -40,14 +41,11 @@ def omct(
         ConfigError: An argument is wrong.
     """
     names = options.algorithms()
-    unknown = [name for name in names if name not in known_algorithms()]
-    if unknown or not names:
-        raise ConfigError(
-            "--algorithm", f"unknown {unknown}", f"Allowed: {', '.join(known_algorithms())}."
-        )
+    check_algorithms(names)
     if not 0.05 <= amplitude <= 10.0:
         raise ConfigError("--amplitude", f"{amplitude:g} m/s2", "Give 0.05 to 10 m/s2.")
     boundaries = None if boundaries_file is None else read_boundaries(boundaries_file)
+    make_folder("--out", out)
     machine, tuning = options.machine(), options.tuning()
 
     def tell(text: str) -> None:
@@ -88,7 +86,6 @@ def omct(
             "notes": notes,
         },
     )
-    out.mkdir(parents=True, exist_ok=True)
     (out / "omct.txt").write_text(text, encoding="utf-8")
     (out / "omct.json").write_text(
         json.dumps(mapping, indent=1, allow_nan=False) + "\n", encoding="utf-8"

@@ -8,11 +8,11 @@ from math import log10
 from typing import Final
 
 from motionserver import __version__
+from motionserver.evaluate.html import document
 from motionserver.evaluate.omct.boundaries import Boundaries, Boundary
 from motionserver.evaluate.omct.report import of_test, outside
 from motionserver.evaluate.omct.run import Omct, Response
 from motionserver.evaluate.omct.sines import TESTS, Test
-from motionserver.evaluate.page import STYLE as PAGE_STYLE
 
 _WIDTH: Final = 440
 _LEFT: Final = 44
@@ -47,14 +47,12 @@ def to_html(found: Omct, boundaries: Boundaries | None, facts: str, notes: Seque
     )
     cards = "".join(_card(test, of_test(found, test.number), boundaries) for test in TESTS)
     rules = "".join(f"<p>{escape(note)}.</p>" for note in notes)
-    title = "Objective motion cueing test"
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{title}</title><style>{PAGE_STYLE}{_STYLE}</style></head><body><h1>{title}</h1>"
+    return document(
+        "Objective motion cueing test",
+        _STYLE,
         f'<p class="soft">{escape(facts)} motionserver {__version__}.</p>'
         f'<div class="key">{key}</div><div class="grid2">{cards}</div>'
-        f'<h2>How to read it</h2><div class="notes">{rules}</div></body></html>\n'
+        f'<h2>How to read it</h2><div class="notes">{rules}</div>',
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from motionserver import __version__
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.reproduce.draw import figure3, figure4, page
 from motionserver.evaluate.reproduce.thondel2014 import Claim, Reproduction, claims, run_all
 from motionserver.evaluate.svg import figure
@@ -36,13 +37,7 @@ def reproduce(paper: str = "thondel2014", out: str | Path = "out/thondel2014") -
     """
     if paper not in PAPERS:
         raise ConfigError("reproduce", f"unknown paper {paper!r}", f"Allowed: {', '.join(PAPERS)}.")
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(
-            f"--out {folder}", f"cannot be made ({error.strerror})", "Name a folder to write to."
-        ) from error
+    folder = make_folder("--out", out)
     found = run_all(load_machine("t2-compact"), _tell)
     tried = claims(found)
     write(found, tried, folder)

@@ -8,7 +8,7 @@ import numpy as np
 
 from motionserver import __version__
 from motionserver.core.axes import Axis
-from motionserver.evaluate.page import STYLE
+from motionserver.evaluate.html import document
 from motionserver.evaluate.reproduce.paper import NOISE, PLANT_GAIN, Run
 from motionserver.evaluate.reproduce.thondel2014 import (
     CERTIFIED,
@@ -115,12 +115,9 @@ def page(found: Reproduction, tried: list[Claim]) -> str:
         + f'<div class="frame">{figure(panels)}</div>'
         for number, (title, panels) in enumerate(plots)
     )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>Thöndel 2014, reproduced</title><style>{STYLE}{PLOT_STYLE}"
-        ".claims td:nth-child(2){text-align:left;white-space:normal}</style></head><body>"
-        "<h1>Thöndel 2014, reproduced</h1>"
+    return document(
+        "Thöndel 2014, reproduced",
+        PLOT_STYLE + ".claims td:nth-child(2){text-align:left;white-space:normal}",
         '<p class="soft">Model predictive motion cueing algorithm for a truck simulator, '
         f"ECMS 2014, figures 3 and 4, by the server's own code on {escape(found.machine.name)} "
         f"<code>{found.machine.digest}</code>; filters and signals are ours, the paper prints "
@@ -128,7 +125,7 @@ def page(found: Reproduction, tried: list[Claim]) -> str:
         f"<p>{len(tried) - lost} of {len(tried)} claims hold.</p>{figures}"
         f'<h2>Claims</h2><div class="frame"><table class="claims"><tbody>{rows}'
         "</tbody></table></div>"
-        f'<h2>All runs</h2><div class="frame">{_table(found)}</div></body></html>\n'
+        f'<h2>All runs</h2><div class="frame">{_table(found)}</div>',
     )
 
 

@@ -161,8 +161,8 @@ def claims(found: Reproduction) -> list[Claim]:
     out = [
         Claim(
             "Fig. 3: the standard MCA leaves both limits, displacement and inclination",
-            f"{1e3 * reach:.0f} mm of {1e3 * box[0]:.0f}, "
-            f"{np.degrees(lean):.1f} deg of {np.degrees(box[4]):.1f}",
+            f"{1e3 * reach:.0f} mm of {1e3 * box[Axis.SURGE]:.0f}, "
+            f"{np.degrees(lean):.1f} deg of {np.degrees(box[Axis.PITCH]):.1f}",
             bool(reach > box[Axis.SURGE] and lean > box[Axis.PITCH]),
         ),
         Claim(

@@ -6,9 +6,12 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from motionserver.core.limits import Machine
-from motionserver.cueing.registry import algorithms as known_algorithms
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
+from motionserver.evaluate.ranges import PLANNER_RATES_HZ, check_algorithms
 from motionserver.evaluate.recording import Recording, read_recording
 from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.criterion import SICKNESS_WEIGHT, Criterion
@@ -83,13 +86,9 @@ def tune(
         RecordingError: A recording cannot be read.
     """
     machine = load_machine(platform) if isinstance(platform, str) else platform
-    machine = machine if head is None else machine.with_head(head)  # type: ignore[arg-type]
+    machine = machine if head is None else machine.with_head(np.array(head))
     _check(algorithm, trials, refine, seed, excerpt, planner_hz, scale, jobs)
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out {out}", str(error.strerror), "Name a folder.") from error
+    folder = make_folder("--out", out)
     drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
     stretches = stretches_of(drives, excerpt)
     base = apply_changes(
@@ -165,17 +164,13 @@ def _check(
     scale: float,
     jobs: int,
 ) -> None:
-    known = known_algorithms()
-    if algorithm not in known:
-        raise ConfigError(
-            "--algorithm", f"unknown algorithm {algorithm!r}", f"Allowed: {', '.join(known)}."
-        )
+    check_algorithms([algorithm])
     for option, value, low, high, unit in (
         ("--trials", trials, 2, 2000, ""),
         ("--refine", refine, 0, 500, ""),
         ("--seed", seed, 0, 2**31 - 1, ""),
         ("--jobs", jobs, 0, 256, ""),
-        ("--planner-rate", planner_hz, 20, 250, " Hz"),
+        ("--planner-rate", planner_hz, *PLANNER_RATES_HZ, " Hz"),
         ("--scale", scale, 0.05, 1, ""),
         ("--excerpt", excerpt, 0, 1e5, " s"),
     ):

@@ -23,7 +23,7 @@ _SILENT = 0.05 * FORCE_THRESHOLD
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Figures of one drive, over its judged part.
+    """Figures of one drive: of its judged part, or of the whole where that is said.
 
     Attributes:
         nrmse: RMSE of f_x and f_y together over the rms of what was wanted [-]; 1 = no motion.
@@ -34,10 +34,11 @@ class Outcome:
         rmse_heave: RMSE of f_z [m/s2].
         rmse_rates: RMSE of the body rates together [rad/s].
         tilt_p99: 99th percentile of the tilt rate nobody asked for [rad/s].
-        stroke_used: Share of the stroke of the leg that uses most [-].
-        refused: Share of periods whose candidate was refused altogether or missing [-].
+        stroke_used: Share of the stroke of the leg that uses most, over the whole drive [-].
+        refused: Share of periods whose candidate was refused altogether or missing, over the
+            whole drive [-].
         violations: Executed samples beyond a hard limit, over the whole drive; must be 0.
-        rejected: Plans the guard's verification rejected; must be 0.
+        rejected: Plans the guard's verification rejected, over the whole drive; must be 0.
         broken: Names of the limits broken.
     """
 

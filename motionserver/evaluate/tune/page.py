@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Final
 
-from motionserver.evaluate.page import STYLE
+from motionserver.evaluate.html import cards, document
 from motionserver.evaluate.tune.preset import preset_name, preset_text
 from motionserver.evaluate.tune.report import facts
 from motionserver.evaluate.tune.result import TuneResult
@@ -31,25 +31,22 @@ def to_html(result: TuneResult) -> str:
     said = "".join(f"<p>{escape(line)}.</p>" for line in verdict(result))
     parts = "".join(table_html(table) for table in tables(result))
     dots = "".join(_dots(result, parameter) for parameter in result.settings.space)
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{_STYLE}</style></head><body>"
-        f"<h1>{escape(title)}</h1>"
-        + "".join(f'<p class="soft">{escape(line)}.</p>' for line in more)
+    return document(
+        title,
+        _STYLE,
+        "".join(f'<p class="soft">{escape(line)}.</p>' for line in more)
         + f"{_cards(result)}{said}{parts}<h2>Every trial</h2>"
         '<p class="soft">Mean score over each tunable: blue in the running, grey out of it, orange '
         f'ring the default, green ring the choice.</p><div class="frame dots">{dots}</div>'
         f"{table_html(trials_table(result))}<h2>{escape(preset_name(result))}.toml</h2>"
         f'<div class="frame"><pre>{escape(preset_text(result))}</pre></div>'
-        f'<h2>Again</h2><div class="frame"><pre>{escape(result.command)}</pre></div>'
-        "</body></html>\n"
+        f'<h2>Again</h2><div class="frame"><pre>{escape(result.command)}</pre></div>',
     )
 
 
 def _cards(result: TuneResult) -> str:
     held, default = result.held_out_score, result.score(result.default)
-    cards = [
+    shown = [
         (f"{default:.3f}", "with the defaults", ""),
         (
             f"{held:.3f}",
@@ -63,14 +60,7 @@ def _cards(result: TuneResult) -> str:
             "poor" if result.held_out_violations else "good",
         ),
     ]
-    return (
-        '<div class="cards">'
-        + "".join(
-            f'<div class="card {kind}"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
-            for value, text, kind in cards
-        )
-        + "</div>"
-    )
+    return cards(shown)
 
 
 def table_html(table: Table) -> str:

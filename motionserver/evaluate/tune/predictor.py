@@ -14,8 +14,9 @@ import numpy as np
 from motionserver import __version__
 from motionserver.cueing.predictor import Predictor, save
 from motionserver.errors import ConfigError
+from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.fit_predictor import fit
-from motionserver.evaluate.page import STYLE
+from motionserver.evaluate.html import document
 from motionserver.evaluate.recording import Recording, read_recording
 from motionserver.evaluate.tune.page import table_html
 from motionserver.evaluate.tune.report import aligned
@@ -49,11 +50,7 @@ def tune_predictor(
         raise ConfigError(
             "--predictor", f"{name!r} is no name", "Give lower-case letters, digits, hyphens."
         )
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"--out {out}", str(error.strerror), "Name a folder.") from error
+    folder = make_folder("--out", out)
     drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
     words = ["motionserver", "tune", "--predictor", name]
     words += [f"{r.name}.csv" if isinstance(r, Recording) else str(r) for r in recordings]
@@ -126,14 +123,12 @@ def _reports(predictor: Predictor, command: str) -> tuple[str, str]:
     for table in _tables(predictor):
         lines += [table.title, *aligned(table), table.note, ""]
     text = "\n".join([*lines, "again:", f"  {command}"]) + "\n"
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}pre{{overflow-x:auto}}</style></head><body>"
-        f"<h1>{escape(title)}</h1>"
-        + "".join(f'<p class="soft">{escape(fact)}.</p>' for fact in facts)
+    page = document(
+        title,
+        "pre{overflow-x:auto}",
+        "".join(f'<p class="soft">{escape(fact)}.</p>' for fact in facts)
         + "".join(f"<p>{escape(line)}.</p>" for line in worth(predictor))
         + "".join(table_html(table) for table in _tables(predictor))
-        + f'<h2>Again</h2><div class="frame"><pre>{escape(command)}</pre></div></body></html>\n'
+        + f'<h2>Again</h2><div class="frame"><pre>{escape(command)}</pre></div>',
     )
     return text, page

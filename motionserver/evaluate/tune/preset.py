@@ -103,13 +103,16 @@ def read_fold_tunings(path: str | Path) -> dict[str, Tuning]:
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))
         if data["schema"] != SCHEMA:
-            raise KeyError(SCHEMA)
+            raise ValueError(f"its schema is {data['schema']!r}, not {SCHEMA!r}")
         base = TuningModel.model_validate(data["base"])
         return {
             name: apply_changes(base, fold["values"]).to_tuning()
             for name, fold in data["folds"].items()
         }
-    except (OSError, ValueError, KeyError, TypeError, TuningError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, TuningError) as error:
+        what = f"it has no {error}" if isinstance(error, KeyError) else str(error)
         raise ConfigError(
-            str(path), f"no result of 'motionserver tune' ({error})", "Name its result.json."
+            f"--held-out {path}",
+            f"no result of 'motionserver tune' ({what})",
+            "Name its result.json.",
         ) from error

@@ -73,7 +73,7 @@ def _around(name: str, factor: float) -> Parameter:
 
 
 SCALE: Final = Parameter("scale", 0.3, 1.0, logarithmic=False)
-"""Searched only on demand, see `spaces`."""
+"""Searched only on demand, see `space_of`."""
 SPACES: Final[dict[str, tuple[Parameter, ...]]] = {
     "mpc": (
         _around("mpc_weight_position", 10.0),

@@ -10,7 +10,7 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.evaluate.workspace.reach import Limit
-from motionserver.evaluate.workspace.survey import Range, Survey
+from motionserver.evaluate.workspace.result import Range, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount
 
 ROUNDING: Final = 0.01

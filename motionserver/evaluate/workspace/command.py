@@ -14,7 +14,8 @@ from motionserver.evaluate.workspace.advice import Advice, advice
 from motionserver.evaluate.workspace.draw import planes_file
 from motionserver.evaluate.workspace.page import to_html
 from motionserver.evaluate.workspace.reach import Ending
-from motionserver.evaluate.workspace.survey import Corner, Range, Survey, survey
+from motionserver.evaluate.workspace.result import Corner, Range, Survey
+from motionserver.evaluate.workspace.survey import survey
 from motionserver.evaluate.workspace.table import to_text
 from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import BOX_FIELDS, TuningModel, apply_changes

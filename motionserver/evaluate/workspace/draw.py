@@ -12,7 +12,7 @@ import numpy as np
 
 from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.evaluate.workspace.reach import Ending, Limit
-from motionserver.evaluate.workspace.survey import Corner, Plane, Survey
+from motionserver.evaluate.workspace.result import Corner, Plane, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount, corner_of
 
 SIDE: Final = 240

@@ -9,7 +9,7 @@ from typing import Final
 
 from motionserver import __version__
 from motionserver.core.axes import AXIS_NAMES, Array
-from motionserver.evaluate.page import STYLE
+from motionserver.evaluate.html import cards, document
 from motionserver.evaluate.workspace.advice import Advice, smallest_whole
 from motionserver.evaluate.workspace.draw import (
     SIDE,
@@ -22,7 +22,7 @@ from motionserver.evaluate.workspace.draw import (
     units,
 )
 from motionserver.evaluate.workspace.draw import STYLE as PICTURE_STYLE
-from motionserver.evaluate.workspace.survey import Plane, Survey
+from motionserver.evaluate.workspace.result import Plane, Survey
 from motionserver.evaluate.workspace.table import corner_counts
 from motionserver.evaluate.workspace.words import corner_of, lopsided, pose_text
 
@@ -83,11 +83,10 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
         picture(*ranges_picture(found, axes), f"{what} alone")
         for axes, what in (((0, 1, 2), "places"), ((3, 4, 5), "attitudes"))
     )
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{PICTURE_STYLE}{_STYLE}</style></head>"
-        f'<body><h1>{escape(title)}</h1><p class="soft">Straight out of neutral, to where stroke, '
+    return document(
+        title,
+        PICTURE_STYLE + _STYLE,
+        '<p class="soft">Straight out of neutral, to where stroke, '
         "joint angle or conditioning first ends the way. Geometry and limits "
         f"<code>{machine.digest}</code>; pitch is positive nose down. motionserver "
         f"{__version__}.</p>{_cards(found)}{warned}"
@@ -95,7 +94,7 @@ def to_html(found: Survey, warnings: Sequence[Advice]) -> str:
         f"{bars}</div>{notes}</div>"
         f'<h2>Two axes at a time, and all six</h2><div class="planes">{_key(found)}{_field(found)}'
         + "".join(_figure(plane, found, sides) for plane in found.planes)
-        + f"</div><h2>Figures</h2>{_tables(found)}</body></html>\n"
+        + f"</div><h2>Figures</h2>{_tables(found)}",
     )
 
 
@@ -103,7 +102,7 @@ def _cards(found: Survey) -> str:
     whole = sum(corner.scale >= 1.0 for corner in found.corners)
     half = next(one for one in found.shares if one.factor == 0.5)
     swing = found.swing
-    cards = (
+    shown = (
         (f"{whole} of 64", "corners of the tuned box reachable"),
         (
             f"\N{MULTIPLICATION SIGN} {smallest_whole(found):.2f}",
@@ -114,14 +113,7 @@ def _cards(found: Survey) -> str:
         (f"{found.conditioning.value:.2f}", "least sigma_min, as a share of neutral's"),
         (f"{degrees(swing.value):.1f}°", f"largest joint angle, {_allowed(swing.limit)}"),
     )
-    return (
-        '<div class="cards">'
-        + "".join(
-            f'<div class="card"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
-            for value, text in cards
-        )
-        + "</div>"
-    )
+    return cards((value, text, "") for value, text in shown)
 
 
 def _allowed(limit: float | None) -> str:

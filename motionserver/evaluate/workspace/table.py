@@ -9,7 +9,7 @@ from typing import Final
 
 from motionserver.evaluate.workspace.advice import Advice, smallest_whole
 from motionserver.evaluate.workspace.homing import FACTORS
-from motionserver.evaluate.workspace.survey import Corner, Extreme, Range, Survey
+from motionserver.evaluate.workspace.result import Corner, Extreme, Range, Survey
 from motionserver.evaluate.workspace.words import amount, corner_of, lopsided, pose_text
 
 WIDTH: Final = 80

@@ -6,7 +6,7 @@ from math import degrees
 from typing import Final
 
 from motionserver.core.axes import AXIS_NAMES
-from motionserver.evaluate.workspace.survey import Corner, Range
+from motionserver.evaluate.workspace.result import Corner, Range
 
 TOWARDS: Final = (
     ("backwards", "forwards"),

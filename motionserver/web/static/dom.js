@@ -20,4 +20,8 @@ export function fixed(value, digits, unit = "") {
   return (Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−")) + (unit && ` ${unit}`);
 }
 
+// The six coordinates of a pose: name, unit shown, units per SI unit, decimals shown.
+const MM = 1e3, DEG = 180 / Math.PI;
+export const POSE = [["surge", "mm", MM, 0], ["sway", "mm", MM, 0], ["heave", "mm", MM, 0], ["roll", "°", DEG, 1], ["pitch", "°", DEG, 1], ["yaw", "°", DEG, 1]];
+
 export const list = (value) => (Array.isArray(value) ? value : []);

@@ -4,11 +4,13 @@ import { byId, fixed, isNumber, list, make, put } from "./dom.js";
 
 export const COLOURS = ["#d79ac0", "#f0d442", "#9be564", "#ff8f6b", "#9fadba", "#35c9a3"];
 const LASTING = 4000;
+const AGAIN_MS = 3000; // until the names are asked for again, when the planner came after this page
 const percent = (share, digits = 0) => (isNumber(share) ? `${fixed(100 * share, digits)} %` : "–");
 
 export class Engines {
   constructor() {
     this.allowed = [];
+    this.asked = 0;
     this.rows = new Map();
     this.mayTune = this.mayRun = false;
     this.busy = false;
@@ -22,6 +24,7 @@ export class Engines {
   }
 
   async load() {
+    this.asked = performance.now();
     const answer = await send("GET", "/api/side");
     if (answer.ok) this.allowed = answer.body.allowed;
   }
@@ -32,6 +35,7 @@ export class Engines {
 
   show(status) {
     const side = status.planner?.side;
+    if (side && !this.allowed.length && performance.now() - this.asked > AGAIN_MS) this.load();
     if (!side || !this.allowed.length) return;
     this.wanted = list(side.wanted);
     const driving = { ...side.driving, drives: true };

@@ -45,7 +45,8 @@ export class Hexapod {
   drag() {
     let last = null;
     this.canvas.addEventListener("pointerdown", (e) => { last = e; this.canvas.setPointerCapture(e.pointerId); });
-    this.canvas.addEventListener("pointerup", () => { last = null; });
+    // also when the browser takes the pointer away, to scroll: no pointerup follows then
+    this.canvas.addEventListener("lostpointercapture", () => { last = null; });
     this.canvas.addEventListener("pointermove", (e) => {
       if (!last) return;
       this.turn -= (e.clientX - last.clientX) * 0.008;

@@ -1,11 +1,10 @@
 // State, processes, pose, timing, rejected plans and events.
-import { byId, fixed, isNumber, list, make, put } from "./dom.js";
+import { POSE, byId, fixed, isNumber, list, make, put } from "./dom.js";
 
 const LOOKS = {
   OFFLINE: ["○", "--dim"], PARKED: ["■", "--dim"], RAISING: ["▲", "--yellow"], READY: ["●", "--blue"], RUN: ["▶", "--green"],
   HOLD: ["❚❚", "--orange"], PARKING: ["▼", "--yellow"], FAULT: ["✕", "--red"], SAFE: ["◆", "--violet"], UNKNOWN: ["?", "--red"],
 };
-const POSE = [["surge", "mm", 1e3, 0], ["sway", "mm", 1e3, 0], ["heave", "mm", 1e3, 0], ["roll", "°", 57.29578, 1], ["pitch", "°", 57.29578, 1], ["yaw", "°", 57.29578, 1]];
 
 export function showState(status) {
   const [mark, tone] = LOOKS[status.state] || LOOKS.UNKNOWN;
@@ -77,7 +76,7 @@ export function showNumbers(status) {
     ["Tick late max, missed", `${fixed(tick.late_max_ms, 1)} ms, ${fixed(tick.missed, 0)}`, tick.missed > 0],
     ["Plan share κ", fixed(p.kappa ?? g.plan?.kappa, 3)],
     ["Tracking error", isNumber(g.tracking_error) ? fixed(1e3 * g.tracking_error, 2, "mm") : "–"],
-    ["Plans halved, refused", `${fixed(p.halved ?? p.counters?.plans_halved ?? 0, 0)}, ${fixed(p.refused ?? p.counters?.plans_refused ?? 0, 0)}`],
+    ["Plans halved, refused", `${fixed(p.counters?.plans_halved ?? 0, 0)}, ${fixed(p.counters?.plans_refused ?? 0, 0)}`],
     ["Plan played", g.plan ? `${fixed(Math.max(0, g.plan.time), 2)} of ${fixed(g.plan.duration, 2)} s` : "–"],
     ...(isNumber(p.tracking?.mismatch) ? [["Measured against felt", fixed(p.tracking.mismatch, 2, "m/s²"), p.tracking.alarm]] : []),
     ...[["Planner", p.trouble], ["Source error", source.last_error]].filter(([, text]) => text).map(([name, text]) => [name, text, true]),

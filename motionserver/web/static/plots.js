@@ -1,10 +1,9 @@
 // Rolling plots of the last twenty seconds.
-import { byId, fixed, isNumber, list, make } from "./dom.js";
+import { POSE, byId, fixed, isNumber, list, make } from "./dom.js";
 
 const SPAN = 20;
 const AXIS = { stroke: "#8b99a6", font: "11px system-ui, sans-serif", grid: { stroke: "#222c36", width: 1 }, ticks: { show: false } };
 const FORCE = ["x  surge", "y  sway", "z  heave"];
-const POSE = [["surge", "mm", 1e3], ["sway", "mm", 1e3], ["heave", "mm", 1e3], ["roll", "°", 57.29578], ["pitch", "°", 57.29578], ["yaw", "°", 57.29578]];
 
 function symmetric(least) {
   return (_, low, high) => {
@@ -99,11 +98,11 @@ export class Plots {
       caption(plot.title, FORCE[i], `felt ${fixed(last.felt[i], 2)}, wanted ${fixed(last.wanted[i], 2)} m/s²`);
     });
     this.axes.forEach((plot, i) => {
-      const [name, unit, k] = POSE[i];
+      const [name, unit, k, digits] = POSE[i];
       const column = (key, sign = 1) => rows.map((r) => (isNumber(r[key][i]) ? sign * r[key][i] * k : null));
       plot.plot.setData([times, column("x_max"), column("x_max", -1), column("box"), column("box", -1), column("pose")]);
       const share = last.x_max[i] / last.box[i];
-      caption(plot.title, name, `±${fixed(last.x_max[i] * k, unit === "mm" ? 0 : 1)} ${unit}${isNumber(share) ? ` (${Math.round(100 * share)} %)` : ""}`);
+      caption(plot.title, name, `±${fixed(last.x_max[i] * k, digits)} ${unit}${isNumber(share) ? ` (${Math.round(100 * share)} %)` : ""}`);
     });
   }
 }

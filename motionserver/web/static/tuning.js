@@ -4,6 +4,7 @@ import { byId, make, put } from "./dom.js";
 
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser", "Six axes"];
 const LASTING = 6; // looks, ten a second
+const AGAIN = 30; // looks until the form is asked for again
 const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
@@ -122,8 +123,10 @@ export class Tuning {
   // Somebody else changed the tuning: show it, unless changes are pending here. The status may be
   // older than an answer just received, so a difference counts only once it has lasted.
   noticed(version) {
-    const differs = this.version !== null && version !== undefined && version !== this.version && !this.busy;
+    const differs = version !== undefined && version !== this.version && !this.busy;
     this.differing = differs ? this.differing + 1 : 0;
+    // a planner that came after this page: there is no form yet
+    if (this.version === null && this.differing % AGAIN === LASTING) return void this.load();
     if (this.differing !== LASTING) return;
     if (Object.keys(this.changes()).length === 0) this.load();
     else this.say(`The tuning is at version ${version} by now; apply will be refused until you discard.`, true);
