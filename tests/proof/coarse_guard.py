@@ -5,7 +5,6 @@ computes of plans is pure and remembered here, and two plans that would be playe
 on are one.
 """
 
-from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,7 +18,7 @@ from motionserver.core.limits import Pace
 from motionserver.core.motion.moves import rest_to_rest
 from motionserver.core.safety import act
 from motionserver.core.safety.given import GuardConfig, Request, TickInput
-from motionserver.core.safety.states import CUED, State
+from motionserver.core.safety.states import CUED, RAISED, State
 from motionserver.core.safety.verdict import AcceptedPlan
 from motionserver.core.safety.watchdog import CueStatus, Patience
 from motionserver.core.state import DriveMode
@@ -28,8 +27,6 @@ from motionserver.cueing.governor import remainder
 SECOND = 1_000_000_000
 SEND = 0.5
 START = 1000 * SECOND
-LONG = 5
-"""Ages beyond this many ticks are alike: every patience has run out."""
 AWAY = np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0])
 ELSEWHERE = np.array([-0.03, 0.0, 0.02, 0.0, 0.0, 0.0])
 
@@ -239,47 +236,55 @@ class CoarseGuard:
         status, driving, silent = node.source
         newest, valid, off, excused, excused_ns = node.device
         now = node.now
-        held = state is State.HOLD
         timed = state in (State.RAISING, State.PARKING)
+        latched = state in (State.FAULT, State.SAFE)
+        followed = state in RAISED or (playback is not None and not playback.is_at_rest)
         answer = None
         if newest is not None:
+            lost = now - newest.arrival_ns > 3 * SECOND
             answer = (
                 newest.phase,
                 bool(newest.faults),
                 newest.estop,
-                newest.legs.tobytes() if state not in CUED else np.array_equal(newest.legs, node.last.legs),
-                _age(now, newest.arrival_ns),
+                _place(newest, node.last) if newest.phase is Phase.UP else None,
+                _age(now, newest.arrival_ns, 4),
+                0 if lost else _age(now, valid, 1),
+                _age(now, excused_ns, 4) if excused is newest else None,
             )
+        upstream = None
+        if state in CUED or state is State.RAISING:
+            # elsewhere nothing of this is read, and until it is, all of it has run out or began anew
+            fresh = not status.is_stale(now)
+            upstream = (
+                _age(now, resumed if excused_of == accepted else accepted, 2),
+                status.mode if fresh else None,
+                _age(now, driving, 1) if fresh else None,
+                _age(now, silent, 2),
+            )
+        held = (_age(now, since, 3), _age(now, max(since, paused), 2))
         return (
             state,
-            _age(now, since) if held else 0,
-            _age(now, max(since, paused)) if held else 0,
+            held if state is State.HOLD else None,
             None if playback is None else self.played(playback),
-            max(-1, min(LONG + 8, (deadline - now) // SECOND)) if timed else 0,
-            _age(now, accepted),
-            max(0, reset - now),
+            max(-1, (deadline - now) // SECOND) if timed else 0,
+            upstream,
+            excused_of == accepted,
+            max(0, reset - now) if latched else 0,
             leaving,
             engaged_once,
             bool(inconsistent),
             astray,
-            _age(now, resumed) if excused_of == accepted else None,
-            None if status.is_stale(now) else status.mode,
-            _age(now, driving),
-            _age(now, silent),
             answer,
-            _age(now, valid),
-            _age(now, off),
-            _age(now, excused_ns) if excused is not None and excused is newest else None,
-            node.last.legs.tobytes() if state in (State.FAULT, State.SAFE) else 0,
+            _age(now, off, 1) if followed else None,
             node.engaged,
             node.asked,
         )
 
 
-def _age(now, then):
-    return None if then is None else min(LONG, (now - then) // SECOND)
+def _place(newest, last):
+    return "told" if np.array_equal(newest.legs, last.legs) else newest.legs.tobytes()
 
 
-def blank(record):
-    """A copy, for those who look at what was before."""
-    return copy(record)
+def _age(now, then, most):
+    """Ticks since then; beyond ``most`` every patience has run out, and ages are alike."""
+    return None if then is None else min(most, (now - then) // SECOND)

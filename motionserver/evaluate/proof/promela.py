@@ -31,8 +31,7 @@ _WORLD: Final = """\
 #define UP 2
 #define SILENT 0
 #define PAUSES 1
-#define LEAVES 2
-#define DRIVES 3
+#define DRIVES 2
 #define latched (state == FAULT || state == SAFE)
 #define moving (raised || (state == FAULT && !standing))
 
@@ -57,12 +56,12 @@ inline hostile() {
   if
   :: source = SILENT
   :: source = PAUSES; planned = 1
-  :: source = LEAVES; planned = 1
   :: source = DRIVES
   :: source = DRIVES; planned = 1
   fi;
-  any(gap); any(engage_wish); any(park_wish); any(late);
-  if :: latched && standing -> asked = 1 :: asked = 0 :: skip fi
+  any(gap); any(park_wish); any(late);
+  if :: state == PARKED -> any(engage_wish) :: else -> skip fi;
+  if :: latched && standing -> asked = 1 :: asked -> asked = 0 :: skip fi
 }
 
 inline peaceful() {
@@ -92,7 +91,7 @@ inline notice() {
   h_DEVICE_DOWN = valid && phase == DOWN && (state != PARKING || standing);
   h_DEVICE_UP = valid && phase == UP;
   h_RAISED = valid && phase == UP;
-  h_PARK = park_wish || source == LEAVES;
+  h_PARK = park_wish;
   h_TROUBLE = source == SILENT || source == PAUSES || !planned;
   h_CUEING = source == DRIVES && planned;
   h_HOLD_EXPIRED = state == HOLD && late;
