@@ -93,6 +93,7 @@ class CoarseGuard:
         machine = replace(compact(), pace=Pace(0.6, 8.0, 200.0))
         self.machine = machine
         self.accepted = {}
+        self.last_order = None
         self._memory = {}
         self._alike = {}
         self._signs = {}

@@ -27,6 +27,7 @@ DEVICE = (
     "down low fault",
     "down low estop",
 )
+SOME = (*DEVICE[:7], "up told estop")
 UPSTREAM = (
     ("none", "none"),
     ("none", "moves"),
@@ -37,7 +38,13 @@ UPSTREAM = (
     ("pause", "moves"),
     ("bye", "moves"),
 )
-PAIRS = (("none", "none"), ("drive", "moves"), ("drive", "none"), ("pause", "moves"), ("bye", "moves"))
+PAIRS = (
+    ("none", "none"),
+    ("drive", "moves"),
+    ("drive", "none"),
+    ("pause", "moves"),
+    ("bye", "moves"),
+)
 OPERATOR = (
     ("none", 1),
     ("engage", 1),
@@ -75,6 +82,7 @@ class Explorer:
     def step(self, node, given):
         coarse = self.coarse
         setpoint, answers = coarse.tick(node, given)
+        coarse.last_order = setpoint.order
         record = coarse.guard.record
         before, after = node.record[0], record.state
         granted = given.operator == "reset" and answers == ("",)
@@ -116,17 +124,23 @@ class Explorer:
 
 
 def hostile(node):
-    """Whatever device, source and planner may do, and beside it an operator or a gap."""
-    leaving = node.record[6]
-    for device in DEVICE[:9]:
-        for source, planner in PAIRS:
+    """Whatever the device may do, and beside it source and planner, an operator, or a gap."""
+    state = node.record[0]
+    for device in SOME:
+        for source, planner in PAIRS if state in RAISED or state is State.PARKED else PAIRS[:2]:
             yield Given(device, source, planner)
-        for operator, gap in OPERATOR[2:]:
-            if not leaving or operator == "reset":
-                yield Given(device, "drive", "moves", operator, gap)
-        if device in (UP, DOWN) and not leaving:
-            for source, planner in PAIRS:
-                yield Given(device, source, planner, "engage")
+        if state in LATCHED:
+            yield Given(device, "drive", "moves", "reset")
+        elif state in RAISED:
+            yield Given(device, "drive", "moves", "park")
+        if device in (UP, DOWN, "silent"):
+            for gap in (2, 3):
+                yield Given(device, "drive", "moves", "none", gap)
+    for device, operator in itertools.product((UP, DOWN), ("engage", "park", "reset")):
+        yield Given(device, "drive", "moves", operator)
+    if state is State.PARKED:
+        for device, (source, planner) in itertools.product(SOME, PAIRS):
+            yield Given(device, source, planner, "engage")
 
 
 def everything(node):
