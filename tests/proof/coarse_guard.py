@@ -31,7 +31,7 @@ AWAY = np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0])
 ELSEWHERE = np.array([-0.03, 0.0, 0.02, 0.0, 0.0, 0.0])
 
 
-def patience(lowering):
+def patience(lowering, raising):
     return Patience(
         valid=1.0,
         feedback=0.1,
@@ -40,7 +40,7 @@ def patience(lowering):
         hold=1.0,
         pause=2.0,
         silence=1.0,
-        raising=1.0,
+        raising=raising,
         lowering=lowering,
         gap=2.0,
         reset=1.5,
@@ -89,7 +89,7 @@ _DEVICE = ("newest", "_valid_since", "_astray_since", "_excused", "_excused_ns")
 class CoarseGuard:
     """One guard that is put into any state it was found in, and ticked."""
 
-    def __init__(self, monkeypatch, lowering=0.5, **config):
+    def __init__(self, monkeypatch, lowering=0.5, raising=1.0, **config):
         machine = replace(compact(), pace=Pace(0.6, 8.0, 200.0))
         self.machine = machine
         self.accepted = {}
@@ -99,7 +99,9 @@ class CoarseGuard:
         self._signs = {}
         self._offers = {}
         self._remember(monkeypatch)
-        self.guard = act.Guard(GuardConfig(machine, SEND, 0.5, patience=patience(lowering), **config))
+        self.guard = act.Guard(
+            GuardConfig(machine, SEND, 0.5, patience=patience(lowering, raising), **config)
+        )
         self.low = frozen(leg_lengths(machine, machine.parked_pose) - 0.01)
         self.places = {
             "low": self.low,
@@ -125,8 +127,13 @@ class CoarseGuard:
             monkeypatch.setattr(act, name, remembered)
 
         known("accept_rest", lambda m, pose, number, homes, reach: (pose.tobytes(), reach))
-        known("accept_move", lambda m, parent, at, goal, number, homes: (id(parent), at, goal.tobytes()))
-        known("accept_proposal", lambda m, plan, parent, clock, homes: (id(plan), id(parent), clock))
+        known(
+            "accept_move",
+            lambda m, parent, at, goal, number, homes: (id(parent), at, goal.tobytes()),
+        )
+        known(
+            "accept_proposal", lambda m, plan, parent, clock, homes: (id(plan), id(parent), clock)
+        )
         known("forward", lambda m, legs: (legs.tobytes(),))
         known("leg_motion", lambda m, *state: tuple(map(bytes, state)))
         known("state_now", lambda playback: (id(playback.playing), playback.clock))
@@ -196,7 +203,8 @@ class CoarseGuard:
 
     def _proposal(self, word):
         playback = self.guard.record.playback
-        if word == "none" or playback is None:
+        # "moves" lets a move end before it offers the next one
+        if word == "none" or playback is None or (word == "moves" and not playback.is_at_rest):
             return None
         key = (id(playback), word)
         if key not in self._offers:
@@ -206,7 +214,7 @@ class CoarseGuard:
     def _offer(self, playback, word):
         newest, number = playback.newest.plan, len(self._offers) + 1
         takeover = max(playback.newest_clock, 0.0) + SEND / 2
-        if word == "moves" and playback.is_at_rest:
+        if word == "moves":
             goal = np.zeros(6) if np.any(newest.rest_pose) else AWAY
             plan = rest_to_rest(number, newest.plan_id, takeover, newest.rest_pose, goal, 0.6)
         else:
@@ -254,7 +262,7 @@ class CoarseGuard:
             )
         upstream = None
         if state in CUED or state is State.RAISING:
-            # elsewhere nothing of this is read, and until it is, all of it has run out or began anew
+            # elsewhere nothing of this is read; until it is, all of it has run out or begun anew
             fresh = not status.is_stale(now)
             upstream = (
                 _age(now, resumed if excused_of == accepted else accepted, 2),

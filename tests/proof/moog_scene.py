@@ -189,8 +189,9 @@ class Scene:
             self.stretch, self.judged = [], 0
         instant = self.now * 1e-9
         self.base.advance(instant)
+        # judged as sent: what a broken cable swallows is not the host's jump
+        self.judge.observe(datagram, instant, self.base)
         if self.to_base:
-            self.judge.observe(datagram, instant, self.base)
             reply = self.base.receive(datagram, instant)
             if reply is not None and self.to_host:
                 try:
@@ -245,5 +246,3 @@ def scene_in(state):
         scene.until(state, 8.0)
     scene.account()
     return scene
-
-

@@ -12,6 +12,7 @@ from collections import Counter
 import pytest
 from coarse_guard import CoarseGuard, Given
 from explore import DOWN, PAIRS, UP, Broken, Explorer, everything, hostile, rules
+from guard_scenes import in_state
 
 from motionserver.core.device import Order
 from motionserver.core.safety.states import CUED, RAISED, TABLE, Event, State
@@ -21,19 +22,18 @@ LATCHED = (State.FAULT, State.SAFE)
 STILL_ORDERS = (Order.WAIT, Order.PARK)
 
 
-class Base:
-    """A base that obeys: where it is after each order, in the words of the coarse guard."""
+WAYS = {("down", Order.RAISE): "raising", ("up", Order.PARK): "lowering"}
+LATER = {"raising": "up", "lowering": "down"}
 
-    WAYS = {("down", Order.RAISE): "raising", ("up", Order.PARK): "lowering"}
-    LATER = {"raising": "up", "lowering": "down"}
 
-    @classmethod
-    def after(cls, phase, order):
-        return cls.LATER.get(phase) or cls.WAYS.get((phase, order), phase)
+def obeyed(phase, order):
+    """Where a sound base is one tick after an order."""
+    return LATER.get(phase) or WAYS.get((phase, order), phase)
 
-    @staticmethod
-    def says(phase):
-        return f"{phase} {'low' if phase == 'down' else 'told'}"
+
+def said(phase):
+    """What a sound base says, in the words of the coarse guard."""
+    return f"{phase} {'low' if phase == 'down' else 'told'}"
 
 
 def ends(explorer, node, phase, words=None, most=60):
@@ -47,10 +47,10 @@ def ends(explorer, node, phase, words=None, most=60):
         if key in seen:
             return State(node.record[0]), last, node
         seen.add(key)
-        setpoint, _ = coarse.tick(node, Given(words or Base.says(phase)))
+        setpoint, _ = coarse.tick(node, Given(words or said(phase)))
         last = setpoint.order
         node = coarse.node(node.now + 1_000_000_000, node.engaged, node.asked)
-        phase = Base.after(phase, last)
+        phase = obeyed(phase, last)
     raise Broken(f"does not end: {node.record[0]}")
 
 
@@ -78,19 +78,18 @@ def explore_sound(coarse):
     found = {(coarse.sign(coarse.first), "down"): start}
     todo = [start]
     for node, phase in todo:
-        choices = [Given(Base.says(phase), *pair) for pair in PAIRS]
-        choices += [
-            Given(Base.says(phase), "drive", "moves", op) for op in ("engage", "park", "reset")
-        ]
-        choices += [Given(Base.says(phase), "drive", planner, "none", 2) for planner in ("moves",)]
-        choices += [Given(Base.says(phase), "drive", "moves", "none", 3)]
+        choices = [Given(said(phase), *pair) for pair in PAIRS]
+        choices += [Given(said(phase), "drive", "moves", op) for op in ("engage", "park", "reset")]
+        if node.record[0] is not State.PARKING:
+            # a gap while parking: test_a_gap_while_parking_is_no_fault
+            choices += [Given(said(phase), "drive", "moves", "none", gap) for gap in (2, 3)]
         for given in choices:
             after = explorer.step(node, given)
             state = after.record[0]
             if state in LATCHED:
                 raise Broken(f"upstream trouble faults: {node.record[0]} {given}")
             order = coarse.last_order
-            follows = Base.after(phase, order)
+            follows = obeyed(phase, order)
             key = (coarse.sign(after), follows)
             if key not in found:
                 found[key] = (after, follows)
@@ -134,9 +133,23 @@ def brief(node):
 
 
 def test_a_sound_base_is_never_faulted(monkeypatch):
-    explorer, states = explore_sound(CoarseGuard(monkeypatch, lowering=3.0))
+    explorer, states = explore_sound(CoarseGuard(monkeypatch, lowering=3.0, raising=2.5))
     tell("sound world", states, explorer)
-    assert not {b for _, b in explorer.edges} & {"FAULT", "SAFE"}
+    reached = {b for _, b in explorer.edges}
+    assert reached == {state.value for state in State} - {"FAULT", "SAFE", "OFFLINE"}
+
+
+@pytest.mark.xfail(
+    strict=True,
+    raises=AssertionError,
+    reason="the deadline of parking runs on while the guard's own loop, and with it the plan's "
+    "clock, stands still",
+)
+def test_a_gap_while_parking_is_no_fault():
+    b = in_state("PARKING")
+    b.tick(gap_ns=30_000_000_000)
+    b.run(0.1)
+    assert b.state == "PARKING", b.record.reason
 
 
 WRONG = {
@@ -175,7 +188,7 @@ def test_a_wrong_cell_is_noticed(monkeypatch, name):
 def test_what_never_ends_is_noticed(monkeypatch, state, event, target):
     monkeypatch.setitem(TABLE, state, {**TABLE[state], event: target})
     with pytest.raises(Broken):
-        explore_sound(CoarseGuard(monkeypatch, lowering=3.0))
+        explore_sound(CoarseGuard(monkeypatch, lowering=3.0, raising=2.5))
 
 
 @pytest.mark.campaign
