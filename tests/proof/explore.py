@@ -133,7 +133,7 @@ def hostile(node):
             yield Given(device, "drive", "moves", "reset")
         elif state in RAISED:
             yield Given(device, "drive", "moves", "park")
-        if device in (UP, DOWN, "silent"):
+        if state in CUED and device in (UP, "silent"):
             for gap in (2, 3):
                 yield Given(device, "drive", "moves", "none", gap)
     for device, operator in itertools.product((UP, DOWN), ("engage", "park", "reset")):

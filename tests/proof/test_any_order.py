@@ -10,7 +10,13 @@ import struct
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    rule,
+    run_state_machine_as_test,
+)
 from moog_scene import KINDS, LATCHED, Scene, scene_in
 from motion_clients.moog_wire import Fault
 from motion_protocol import Mode
@@ -171,13 +177,11 @@ class AnyOrder(RuleBasedStateMachine):
 
 def play(examples, steps):
     profile = settings(max_examples=examples, stateful_step_count=steps, **LEAST)
-    from hypothesis.stateful import run_state_machine_as_test
-
     run_state_machine_as_test(AnyOrder, settings=profile)
 
 
 def test_in_any_order():
-    play(examples=4, steps=12)
+    play(examples=3, steps=10)
 
 
 @pytest.mark.campaign
