@@ -107,7 +107,7 @@ def tell(name, states, explorer):
 
 def test_a_hostile_world(monkeypatch):
     coarse = CoarseGuard(monkeypatch)
-    explorer = Explorer(coarse, rules).explore(coarse.first, hostile)
+    explorer = Explorer(coarse, rules, most=20_000).explore(coarse.first, hostile)
     tell("hostile world", len(explorer.found), explorer)
     # every cell of the table that leads somewhere was taken, whatever event led there
     ways = {(a.value, b.value) for a in State for b in TABLE[a].values()}
