@@ -52,6 +52,8 @@ class Supervisor:
         """
         if gap > self._gap:
             self.device.excuse(now_ns)
+            # the plan's clock stood still as well
+            record.deadline_ns += int(gap * SECOND)
             if self._excused[0] != record.accepted_ns:
                 self._excused = (record.accepted_ns, now_ns)
         happened = set(self._events(record, now_ns, gap)) | wishes
