@@ -149,6 +149,21 @@ async def test_the_later_packet_with_the_shorter_way_overtakes(target, peers):
     assert arrived != sent
 
 
+async def test_who_is_not_held_back_does_not_wait_for_who_is(target, peers):
+    sent = [bytes([k]) for k in range(20)]
+    flaws = LinkFlaws(delay=0.01, reorder=0.5, reorder_delay=600.0)
+    link = FlawedLink(flaws, seed=seed_of(4, 0, "there"))
+    at_once = [d for d in sent for arrival in link.carry(0.0, d) if arrival.delay < 1.0]
+    assert 3 < len(at_once) < 17
+    assert at_once[0] != sent[0]
+    async with FaultProxy(HERE, target.address, there=flaws, seed=4) as proxy:
+        peers.append(peer := End(proxy.address))
+        for datagram in sent:
+            peer.send(datagram)
+        assert [(await target.receive())[0] for _ in at_once] == at_once
+        assert proxy.waiting["there"] == len(sent) - len(at_once)
+
+
 async def test_silence_swallows_everything(target, peers):
     silent = LinkFlaws(silences=((0.0, inf),))
     async with FaultProxy(HERE, target.address, there=silent) as proxy:
