@@ -19,7 +19,7 @@ any_flaws = st.builds(
     delay=st.floats(0, 0.1),
     jitter=st.floats(0, 0.1),
 )
-traffic = st.lists(st.tuples(st.floats(0.0, 0.05), st.binary(max_size=30)), max_size=60)
+traffic = st.lists(st.tuples(st.floats(0.0, 0.05), st.binary(max_size=9)), min_size=10, max_size=30)
 
 
 def played(flaws, seed, steps):
@@ -53,7 +53,7 @@ def test_every_packet_is_accounted_for(flaws, seed, steps):
     assert len(out) + len(rest) == counts.received + counts.duplicated - counts.lost
 
 
-@given(pauses=st.lists(st.floats(0.0, 0.1), max_size=40), delay=st.floats(0.001, 0.3))
+@given(pauses=st.lists(st.floats(0.0, 0.1), min_size=10, max_size=30), delay=st.floats(0.001, 0.3))
 def test_a_delay_is_kept_to_and_keeps_the_order(pauses, delay):
     line, sent, now = DelayLine(LinkFlaws(delay=delay)), [], 0.0
     for k, pause in enumerate(pauses):
