@@ -76,7 +76,10 @@ def test_a_flood_is_dropped_and_counted_the_older_packets_stay(size, room):
     assert len(line) == room
     assert line.counts.dropped == room
     assert line.take(1.0) == [bytes([k % 251]) * size for k in range(room)]
-    # what left makes room again
-    line.put(2.0, b"after")
-    assert line.take(3.0) == [b"after"]
+    # what left makes room again, for just as many
+    for _ in range(room):
+        line.put(2.0, bytes(size))
     assert line.counts.dropped == room
+    line.put(2.0, bytes(size))
+    assert line.counts.dropped == room + 1
+    assert line.take(3.0) == [bytes(size)] * room

@@ -212,6 +212,18 @@ async def test_a_target_that_is_away_is_counted_and_may_come_back(target, peers)
         assert_all_accounted_for(proxy)
 
 
+async def test_news_of_one_packet_does_not_cost_the_next(target, peers):
+    address = target.address
+    target.socket.close()
+    async with FaultProxy(HERE, address) as proxy:
+        peers.append(peer := End(proxy.address))
+        # both are read in one go: sending the second meets the refusal of the first
+        peer.send(b"a")
+        peer.send(b"b")
+        await until(lambda: proxy.unreachable == 2)
+        assert proxy.there.sent == 2
+
+
 async def test_a_flood_takes_bounded_room(target, peers):
     slow = LinkFlaws(delay=600.0)
     async with FaultProxy(HERE, target.address, there=slow) as proxy:
