@@ -224,6 +224,19 @@ async def test_news_of_one_packet_does_not_cost_the_next(target, peers):
         assert proxy.there.sent == 2
 
 
+async def test_what_the_network_refuses_is_counted(target, peers):
+    async with FaultProxy(HERE, target.address) as proxy:
+        peers.append(peer := End(proxy.address))
+        peer.send(b"small")
+        await target.receive()
+        (session,) = proxy._sessions.values()
+        session.upstream.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+        peer.send(bytes(60000))
+        await until(lambda: proxy.there.received == 2)
+        assert (proxy.there.sent, proxy.there.unsent) == (1, 1)
+        assert_all_accounted_for(proxy)
+
+
 async def test_a_flood_takes_bounded_room(target, peers):
     slow = LinkFlaws(delay=600.0)
     async with FaultProxy(HERE, target.address, there=slow) as proxy:
