@@ -176,7 +176,8 @@ async def test_silence_swallows_everything(target, peers):
 
 
 async def test_sessions_are_bounded_and_the_quietest_makes_room(target, peers, monkeypatch):
-    async with FaultProxy(HERE, target.address) as proxy:
+    slow = LinkFlaws(delay=600.0)
+    async with FaultProxy(HERE, target.address, there=slow) as proxy:
         for _ in range(MOST_SESSIONS + 3):
             peers.append(peer := End(proxy.address))
             peer.send(b"here")
@@ -194,6 +195,7 @@ async def test_sessions_are_bounded_and_the_quietest_makes_room(target, peers, m
         assert names[0] in proxy.peers
         assert names[1] not in proxy.peers
         assert names[-1] in proxy.peers
+        assert proxy.there.dropped == 1  # what the one that left had on its way
         assert_all_accounted_for(proxy)
 
 
@@ -230,8 +232,8 @@ async def test_what_the_network_refuses_is_counted(target, peers):
         peer.send(b"small")
         await target.receive()
         (session,) = proxy._sessions.values()
-        session.upstream.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
-        peer.send(bytes(60000))
+        session.upstream.shutdown(socket.SHUT_WR)
+        peer.send(b"in vain")
         await until(lambda: proxy.there.received == 2)
         assert (proxy.there.sent, proxy.there.unsent) == (1, 1)
         assert_all_accounted_for(proxy)
