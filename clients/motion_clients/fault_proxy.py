@@ -17,6 +17,7 @@ from typing import Any, Final, Self
 
 from .delay_line import DelayLine, WayCounts
 from .flawed_link import LinkFlaws
+from .timed_way import TimedWay
 
 MOST_SESSIONS: Final = 16
 """Peers served at the same time."""
@@ -48,50 +49,10 @@ def seed_of(seed: int, session: int, way: str) -> int:
     return int.from_bytes(digest[:8], "big")
 
 
-class _Way:
-    """One direction of a session: its line, and the timer that empties it."""
-
-    def __init__(
-        self, line: DelayLine, clock: Callable[[], float], send: Callable[[bytes], None]
-    ) -> None:
-        self.line = line
-        self._clock, self._send = clock, send
-        self._timer: asyncio.TimerHandle | None = None
-        self._due: float | None = None
-
-    def put(self, datagram: bytes) -> None:
-        """Take one datagram in; at once out again if nothing delays it."""
-        self.line.put(self._clock(), datagram)
-        self._empty()
-
-    def close(self) -> None:
-        """Deliver nothing any more."""
-        if self._timer is not None:
-            self._timer.cancel()
-
-    def _wake(self) -> None:
-        self._due = None
-        self._empty()
-
-    def _empty(self) -> None:
-        for datagram in self.line.take(self._clock()):
-            try:
-                self._send(datagram)
-                self.line.counts.sent += 1
-            except OSError:
-                self.line.counts.unsent += 1
-        due = self.line.next_due
-        if due is not None and (self._due is None or due < self._due):
-            self.close()
-            wait = max(0.0, due - self._clock())
-            self._timer = asyncio.get_running_loop().call_later(wait, self._wake)
-            self._due = due
-
-
 class _Session:
     """One peer: a connected socket to the target, and both ways."""
 
-    def __init__(self, upstream: socket.socket, there: _Way, back: _Way) -> None:
+    def __init__(self, upstream: socket.socket, there: TimedWay, back: TimedWay) -> None:
         self.upstream, self.there, self.back = upstream, there, back
         self.heard = 0.0
 
@@ -279,9 +240,11 @@ class FaultProxy:
         asyncio.get_running_loop().add_reader(upstream, self._hear_target, session)
         return session
 
-    def _way(self, name: str, counts: WayCounts, send: Callable[[bytes], None]) -> _Way:
+    def _way(self, name: str, counts: WayCounts, send: Callable[[bytes], None]) -> TimedWay:
         seed = seed_of(self._seed, self.opened, name)
-        return _Way(DelayLine(self._flaws[name], seed=seed, counts=counts), lambda: self.now, send)
+        return TimedWay(
+            DelayLine(self._flaws[name], seed=seed, counts=counts), lambda: self.now, send
+        )
 
 
 def _socket(family: socket.AddressFamily) -> socket.socket:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 from motion_clients.delay_line import WayCounts
-from motion_clients.flawed_link import LinkFlaws
+from motion_clients.fault_proxy import seed_of
+from motion_clients.flawed_link import FlawedLink, LinkFlaws
 from rig import PATIENCE, command, environment, free_port, until
 
 from motionserver.cli import main
@@ -163,6 +164,29 @@ def test_it_ends_by_itself_and_leaves_the_counters(chaos, tmp_path):
     assert written["there"] == written["back"] == {**asdict(WayCounts()), "waiting": 0}
 
 
+def test_every_flag_arrives_under_its_name(chaos, tmp_path):
+    out = tmp_path / "out.json"
+    shares = {"loss": 1.5, "duplicate": 2, "reorder": 3, "corrupt": 4, "truncate": 5}
+    times = {"delay_ms": 6, "jitter_ms": 7, "reorder_ms": 8}
+    flags = [
+        word
+        for name, value in (shares | times).items()
+        for word in (f"--{name.replace('_', '-')}", str(value))
+    ]
+    flags += ["--silent", "9:10", "--silent", "11:", "--seed", "12"]
+    ended = chaos(*ENDS, *flags, "--seconds", "0.01", "--json", str(out))
+    assert ended.returncode == 0
+    written = json.loads(out.read_text("utf-8"))
+    assert written["flaws"] == {
+        **{f"{name}_percent": value for name, value in shares.items()},
+        **times,
+        "silent": [[9.0, 10.0], [11.0, None]],
+    }
+    assert written["seed"] == 12
+    assert written["replies_flawed"] is True
+    assert "loss 1.5 %, duplicate 2 %" in ended.stdout
+
+
 def test_a_second_is_told_by_its_difference():
     before = {"there": {**asdict(WayCounts()), "waiting": 0}}
     before["back"] = dict(before["there"])
@@ -204,9 +228,11 @@ def test_the_summary_tells_what_is_unusual_only_if_it_happened():
         assert any(line.startswith(words) for line in told), words
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int) -> None:
-    """In a terminal: with a line for every second, of packets that went both ways."""
+@pytest.mark.parametrize(
+    ("number", "replies"), [(signal.SIGINT, "--back"), (signal.SIGTERM, "--no-back")]
+)
+def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int, replies: str) -> None:
+    """In a terminal: with a line for every second, of the packets of that second."""
     port, out = free_port(), tmp_path / "out.json"
     ours, theirs = pty.openpty()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as target:
@@ -214,6 +240,7 @@ def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int) -> None:
         target.settimeout(PATIENCE)
         to = f"127.0.0.1:{target.getsockname()[1]}"
         arguments = ("--listen", f"127.0.0.1:{port}", "--to", to, "--json", str(out))
+        arguments += ("--corrupt", "100", "--seed", "3", replies)
         with subprocess.Popen(
             command("chaos", *arguments), env=environment(), stdout=theirs, stderr=theirs
         ) as process:
@@ -224,10 +251,16 @@ def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int) -> None:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 sender.settimeout(PATIENCE)
                 sender.sendto(b"ping", ("127.0.0.1", port))
-                _, upstream = target.recvfrom(100)
+                arrived, upstream = target.recvfrom(100)
+                link = FlawedLink(LinkFlaws(corrupt=1.0), seed=seed_of(3, 0, "there"))
+                assert [arrived] == [copy.datagram for copy in link.carry(0.0, b"ping")]
                 target.sendto(b"pong", upstream)
-                assert sender.recv(100) == b"pong"
-            while b" 1 s  there     1 through    0 lost" not in said:
+                assert (sender.recv(100) == b"pong") == (replies == "--no-back")
+            # the second in which it went, and a later one in which nothing did
+            while (
+                b"there     0 through"
+                not in said.partition(b" s  there     1 through    0 lost")[2]
+            ):
                 said += os.read(ours, 4096)
             process.send_signal(number)
             until(lambda: process.poll() is not None, "the end")
@@ -239,3 +272,5 @@ def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int) -> None:
     assert b"Traceback" not in said
     written = json.loads(out.read_text("utf-8"))
     assert (written["there"]["sent"], written["back"]["sent"]) == (1, 1)
+    assert written["there"]["changed"] == 1
+    assert written["back"]["changed"] == (replies == "--back")
