@@ -142,7 +142,8 @@ def test_it_ends_by_itself_and_leaves_the_counters(chaos, tmp_path):
         *ENDS, "--seconds", "0.05", "--loss", "5", "--silent", "1:", "--json", str(out), "--no-back"
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    first, *_, last = ended.stdout.splitlines()
+    first, *ways, last = ended.stdout.splitlines()
+    assert [line.split()[0] for line in ways] == ["there", "back"]  # no seconds: no terminal
     assert first.endswith(" -> 127.0.0.1:9: loss 5 %, silent 1: s; seed 0; replies pass unharmed")
     assert last == "0 senders in 0.1 s"
     written = json.loads(out.read_text("utf-8"), parse_constant=pytest.fail)
