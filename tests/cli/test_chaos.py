@@ -1,5 +1,6 @@
 """The command `chaos`: what it says, what it refuses, how it ends."""
 
+import contextlib
 import json
 import os
 import pty
@@ -242,9 +243,13 @@ def test_a_signal_ends_it_with_status_0(tmp_path: Path, number: int, replies: st
         to = f"127.0.0.1:{target.getsockname()[1]}"
         arguments = ("--listen", f"127.0.0.1:{port}", "--to", to, "--json", str(out))
         arguments += ("--corrupt", "100", "--seed", "3", replies)
-        with subprocess.Popen(
-            command("chaos", *arguments), env=environment(), stdout=theirs, stderr=theirs
-        ) as process:
+        with (
+            subprocess.Popen(
+                command("chaos", *arguments), env=environment(), stdout=theirs, stderr=theirs
+            ) as process,
+            contextlib.ExitStack() as stack,
+        ):
+            stack.callback(process.kill)  # a failure below must not wait for it
             os.close(theirs)
             said = b""
             while b"->" not in said:
