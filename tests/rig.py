@@ -143,7 +143,7 @@ class Base:
         return asyncio.run_coroutine_threadsafe(now(), self._loop).result(PATIENCE)
 
     def pull_cable(self) -> None:
-        silent = LinkFlaws(silent_from=0.0)
+        silent = LinkFlaws(silences=((0.0, float("inf")),))
 
         def cut(emulator: Emulator) -> None:
             emulator.to_base.flaws = emulator.to_host.flaws = silent

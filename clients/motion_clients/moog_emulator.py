@@ -8,6 +8,7 @@ import json
 import signal
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -159,8 +160,8 @@ class Emulator(asyncio.DatagramProtocol):
         self._hosts.add(addr[:2])
         self.device.advance(now)
         self.judge.observe(data, now, self.device)
-        for delay in self.to_base.delays(now):
-            self._after(delay, lambda: self._deliver(data, addr))
+        for arrival in self.to_base.carry(now, data):
+            self._after(arrival.delay, partial(self._deliver, arrival.datagram, addr))
 
     def error_received(self, exc: Exception) -> None:
         """Note that a host went away; a base does not mind."""
@@ -170,8 +171,8 @@ class Emulator(asyncio.DatagramProtocol):
         now = time.monotonic()
         reply = self.device.receive(data, now)
         if reply is not None:
-            for delay in self.to_host.delays(now):
-                self._after(delay, lambda: self._send(reply, addr))
+            for arrival in self.to_host.carry(now, reply):
+                self._after(arrival.delay, partial(self._send, arrival.datagram, addr))
 
     def _send(self, reply: bytes, addr: Address) -> None:
         if self._transport is not None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 
-from motionserver.cli import doctor, judging
+from motionserver.cli import chaos, doctor, judging
 from motionserver.cli.commands import app
 from motionserver.errors import MotionServerError
 
-__all__ = ["app", "doctor", "judging", "main"]
+__all__ = ["app", "chaos", "doctor", "judging", "main"]
 
 
 def main() -> None:

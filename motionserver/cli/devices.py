@@ -51,7 +51,7 @@ def emulate(
     cut = LinkFlaws()
     if cut_after is not None:
         begin = time.monotonic() + cut_after
-        cut = LinkFlaws(silent_from=begin, silent_until=float("inf"))
+        cut = LinkFlaws(silences=((begin, float("inf")),))
     try:
         return run_emulator(
             host,
