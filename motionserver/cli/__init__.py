@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 
-from motionserver.cli import audit, judging
+from motionserver.cli import audit, blackbox, judging
 from motionserver.cli.commands import app
 from motionserver.errors import MotionServerError
 
-__all__ = ["app", "audit", "judging", "main"]
+__all__ = ["app", "audit", "blackbox", "judging", "main"]
 
 
 def main() -> None:

@@ -19,6 +19,7 @@ from motionserver.core.safety.supervisor import is_standing
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
 from motionserver.guard.snapshot import snapshot
+from motionserver.telemetry.blackbox.guard_box import GuardBox
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
@@ -38,7 +39,8 @@ class GuardLoop:
     ) -> None:
         self.options = options
         self.guard = Guard(options.guard)
-        self._ports = Ports(options, run_dir, link, self.guard.record.counters)
+        self._box = GuardBox(run_dir, self.guard)
+        self._ports = Ports(options, run_dir, link, self.guard.record.counters, self._box.accepted)
         self._requests = RequestServer(run_dir / "guard.sock")
         ticks = 1
         while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
@@ -92,7 +94,9 @@ class GuardLoop:
     def _wake(self) -> None:
         now = now_ns()
         slot = int((now - self._start_ns) / self._tick_ns)
-        self._lateness.ticked(int(now - self._start_ns - (self._tick + 1) * self._tick_ns))
+        late = int(now - self._start_ns - (self._tick + 1) * self._tick_ns)
+        self._lateness.ticked(late)
+        self._box.ticked(late)
         self._tick = slot
         try:
             self._step(now, slot)
@@ -135,9 +139,9 @@ class GuardLoop:
             self._ports.publish(
                 self._sends[-1] if self._sends else now, now, int(due), self.guard.record
             )
-        if setpoint is not None:
-            self._ports.send(setpoint)
-            self._setpoint = setpoint
+        is_sent = setpoint is not None and self._ports.send(setpoint)
+        self._setpoint = setpoint or self._setpoint
+        self._box.note(given, setpoint, answers, is_sent)
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):
             answer = {"ok": not refusal, "state": record.state, "reason": refusal or record.reason}

@@ -7,6 +7,7 @@ import os
 import socket
 import struct
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -28,7 +29,12 @@ class Ports:
     """All that comes in and goes out of the guard, but for requests."""
 
     def __init__(
-        self, options: GuardOptions, run_dir: Path, link: socket.socket, counters: Counter[str]
+        self,
+        options: GuardOptions,
+        run_dir: Path,
+        link: socket.socket,
+        counters: Counter[str],
+        keep: Callable[[bytes], None] = lambda _: None,
     ) -> None:
         self._format = make_platform(options.format, options.options)
         self._peer = options.peer
@@ -38,6 +44,7 @@ class Ports:
         self._seen_proposal = self._maps.proposal.newest_sequence()
         self._seen_cue = 0
         self._accepted_id = 0
+        self._keep = keep
 
     def feedback(self) -> tuple[Feedback, ...]:
         """Answers of the device that wait, at most `DRAIN`; everything else is counted."""
@@ -97,7 +104,9 @@ class Ports:
         playback = record.playback
         newest = None if playback is None else playback.newest.plan
         if newest is not None and newest.plan_id != self._accepted_id:
-            self._maps.accepted.write(pack(newest))
+            packed = pack(newest)
+            self._maps.accepted.write(packed)
+            self._keep(packed)
             self._accepted_id = newest.plan_id
         self._maps.clock.write(
             GuardClock(
@@ -110,13 +119,15 @@ class Ports:
             ).pack()
         )
 
-    def send(self, setpoint: Setpoint) -> None:
-        """Send a setpoint to the platform; what the network refuses is counted."""
+    def send(self, setpoint: Setpoint) -> bool:
+        """Send a setpoint to the platform; what the network refuses is counted, and False."""
         try:
             self._link.sendto(self._format.encode(setpoint), self._peer)
-            self._counters["packets_sent"] += 1
         except OSError:
             self._counters["send_errors"] += 1
+            return False
+        self._counters["packets_sent"] += 1
+        return True
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

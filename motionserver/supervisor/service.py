@@ -16,11 +16,14 @@ from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
 from motionserver.supervisor.addresses import open_link, try_addresses
 from motionserver.supervisor.child import Child
+from motionserver.telemetry.blackbox.room import clear_room, make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
 """Longest wait for the guard to park when the service ends [s]."""
+BOX_PATIENCE: Final = 10.0
+"""Longest wait for a dump when the service ends [s]."""
 LEFT: Final = (
     *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
     *("config.json", "web.json", "tuning.json"),
@@ -71,8 +74,24 @@ class Service:
         self.planner.may_start = self._is_not_cued
         self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
         self.web.wanted = config_web
+        self.box = self._black_box(resolved)
         self._leave = asyncio.Event()
         self.exit_status = 0
+
+    def _black_box(self, resolved: dict[str, Any]) -> Child:
+        """What keeps the last minute and writes it down; without room for it there is none."""
+        box, planner = resolved["blackbox"], resolved["planner"]
+        kept = box["kept"]
+        if kept:
+            try:
+                make_room(self.run_dir, resolved["platform"]["rate_hz"], 1.0 / planner["period"])
+            except OSError as error:
+                log.warning("no black box: no room for it (%s)", error.strerror)
+                kept = 0
+        where = (str(self.run_dir), box["folder"], str(kept))
+        child = Child("black box", ("-m", "motionserver.telemetry.blackbox", *where))
+        child.wanted = kept > 0
+        return child
 
     @staticmethod
     def _take(run_dir: Path) -> TextIO:
@@ -103,6 +122,7 @@ class Service:
         for pattern in LEFT:
             for stale in self.run_dir.glob(pattern):
                 stale.unlink(missing_ok=True)
+        clear_room(self.run_dir)
 
     def leave(self) -> None:
         """End softly: park, then stop everything."""
@@ -117,17 +137,19 @@ class Service:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.leave)
-        keepers = [
-            asyncio.create_task(child.keep()) for child in (*self.guards, self.planner, self.web)
-        ]
+        children = (*self.guards, self.planner, self.web, self.box)
+        keepers = [asyncio.create_task(child.keep()) for child in children]
         watcher = asyncio.create_task(self._show())
         await self._leave.wait()
         log.info("parking")
         self.planner.wanted = self.web.wanted = False
         self.exit_status = await self._park()
         watcher.cancel()
+        # the black box may be writing down how the guard ended
         await asyncio.gather(
-            self.planner.end(signal.SIGTERM, 3.0), self.web.end(signal.SIGTERM, 3.0)
+            self.planner.end(signal.SIGTERM, 3.0),
+            self.web.end(signal.SIGTERM, 3.0),
+            self.box.end(signal.SIGTERM, BOX_PATIENCE),
         )
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
@@ -171,6 +193,13 @@ class Service:
         first, second = self.guards
         return (second, first) if second.pid == pid and pid is not None else (first, second)
 
+    def _deaths(self) -> list[tuple[int, str, int]]:
+        """Ends that nobody wanted, oldest first: instant [ns], who, exit status."""
+        everybody = (*self.guards, self.planner, self.web, self.box)
+        return sorted(
+            (at, child.name, status) for child in everybody for at, status in child.deaths
+        )
+
     async def _show(self) -> None:
         """Tell the page who lives."""
         while True:
@@ -184,10 +213,13 @@ class Service:
                         "spare": spare.pid,
                         "planner": self.planner.pid,
                         "web": self.web.pid,
+                        "blackbox": self.box.pid,
+                        "deaths": self._deaths(),
                         "restarts": {
                             "guard": sum(child.restarts for child in self.guards),
                             "planner": self.planner.restarts,
                             "web": self.web.restarts,
+                            "blackbox": self.box.restarts,
                         },
                     }
                 ).encode()
