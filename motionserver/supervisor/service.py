@@ -193,11 +193,11 @@ class Service:
         first, second = self.guards
         return (second, first) if second.pid == pid and pid is not None else (first, second)
 
-    def _deaths(self) -> list[tuple[int, str, int]]:
-        """Ends that nobody wanted, oldest first: instant [ns], who, exit status."""
+    def _deaths(self) -> list[tuple[int, str, int, int]]:
+        """Ends that nobody wanted, oldest first: instant [ns], who, exit status, process id."""
         everybody = (*self.guards, self.planner, self.web, self.box)
         return sorted(
-            (at, child.name, status) for child in everybody for at, status in child.deaths
+            (at, child.name, status, pid) for child in everybody for at, status, pid in child.deaths
         )
 
     async def _show(self) -> None:

@@ -21,7 +21,7 @@ from motionserver.telemetry.blackbox.room import FOLDER
 COUNT_NS: Final = 1_000_000_000
 """Time between two notes of all counters [ns]."""
 MOST_REQUESTS: Final = 8
-"""Requests noted per second; more are counted by the guard, and cannot wash out what was."""
+"""Different requests noted per second."""
 _NAN: Final = float("nan")
 _SIX: Final = (_NAN,) * 6
 
@@ -44,7 +44,7 @@ class GuardBox:
         self._seen_event = 0
         self._late_ns = self._ticks = 0
         self._counted_ns = 0
-        self._requests = 0
+        self._requests: set[tuple[str, str, str]] = set()
         self._device: tuple[str, tuple[str, ...], bool] = ("", (), False)
         self._last: Setpoint | None = None
 
@@ -155,8 +155,10 @@ class GuardBox:
                     self._event(when, "note", text=text)
             self._seen_event = record.events[-1][0]
         for request, refusal in zip(given.requests, answers, strict=False):
-            self._requests += 1
-            if self._requests <= MOST_REQUESTS:
+            said_by = (request.op, request.by, refusal)
+            # whoever repeats himself cannot wash out what was: the guard counts all of it
+            if said_by not in self._requests and len(self._requests) < MOST_REQUESTS:
+                self._requests.add(said_by)
                 self._event(now, "request", op=request.op, by=request.by, refusal=refusal)
         newest = self._guard.supervisor.device.newest
         if newest is not None:
@@ -165,7 +167,8 @@ class GuardBox:
                 self._device = device
                 self._event(now, "device", state=device[0], faults=device[1], estop=device[2])
         if said or now - self._counted_ns > COUNT_NS:
-            self._counted_ns, self._requests = now, 0
+            self._counted_ns = now
+            self._requests.clear()
             self._event(now, "counters", counters=record.counters)
 
     def _event(self, now_ns: int, what: str, **more: Any) -> None:  # noqa: ANN401  (any JSON)

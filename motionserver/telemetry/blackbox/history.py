@@ -52,10 +52,7 @@ class History:
             raise ValueError(f"{path}: not a history of this version")
         self._stride = _SLOT.size + self.capacity
         # whoever wrote before may have died between a message and the head
-        self._sequence = max(
-            (_SLOT.unpack_from(self._map, self._at(slot))[0] for slot in range(self.slots)),
-            default=0,
-        )
+        self._sequence = max(self._message(slot)[0] for slot in range(self.slots))
         self.too_long = 0
 
     @staticmethod
@@ -93,19 +90,22 @@ class History:
 
     def since(self, sequence: int = 0) -> list[tuple[int, bytes]]:
         """Whole messages after number ``sequence`` that are still kept, oldest first."""
-        # one more than the head tells: its writer may have died just before it said so
-        newest = self.newest_sequence() + 1
+        newest = self.newest_sequence()
         out = []
-        for number in range(max(sequence + 1, newest - self.slots + 1, 1), newest + 1):
-            offset = self._at(number % self.slots)
-            found, length, crc = _SLOT.unpack_from(self._map, offset)
-            if found != number or length > self.capacity:
-                continue
-            body = offset + _SLOT.size
-            data = self._map[body : body + length]
-            if _crc(number, data) == crc:
+        # one more than the head tells: its writer may have died just before it said so
+        for number in range(max(sequence, newest - self.slots, 0) + 1, newest + 2):
+            found, data = self._message(number % self.slots)
+            if found == number:
                 out.append((number, data))
         return out
+
+    def _message(self, slot: int) -> tuple[int, bytes]:
+        """Number and text of what a slot holds; 0 if it is not whole."""
+        offset = self._at(slot)
+        number, length, crc = _SLOT.unpack_from(self._map, offset)
+        body = offset + _SLOT.size
+        data = self._map[body : body + min(length, self.capacity)]
+        return (number, data) if _crc(number, data) == crc else (0, b"")
 
     def close(self) -> None:
         """Unmap; the file stays."""

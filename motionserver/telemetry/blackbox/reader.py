@@ -88,9 +88,7 @@ def _timeline(data: dict[str, Any], at: int) -> Iterator[str]:
         if period["trouble"] != troubled and period["t_ns"] - told_ns > _SELDOM_NS:
             troubled, told_ns = period["trouble"], period["t_ns"]
             happened.append((period["t_ns"], f"planner: {troubled or 'plans again'}"))
-    for t_ns, name, status in (data["service"] or {}).get("deaths", []):
-        if t_ns > at - 60_000_000_000:
-            happened.append((t_ns, f"the {name} died, status {status}"))
+    happened += [(one["t_ns"], one["text"]) for one in data["reasons"] if one["text"][:4] == "the "]
     for t_ns, text in sorted(happened):
         if text:
             yield f"{_time(t_ns, at)}  {text}"

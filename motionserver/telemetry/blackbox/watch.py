@@ -25,6 +25,9 @@ SPACING_NS: Final = int(KEPT * 1e9)
 """A process that dies again and again: its dumps join without a gap and without an overlap [ns]."""
 WRITTEN: Final = frozenset({State.FAULT, State.SAFE})
 _STATUS_BYTES: Final = 4096
+_WEIGHT: Final = tuple(
+    f"died-{who}" for who in ("guard", "service", "planner", "spare-guard", "web", "black-box")
+)
 
 log = logging.getLogger("motionserver.blackbox")
 
@@ -96,8 +99,7 @@ class Watch:
             return
         triggers = sorted((one.trigger for one in self._pending), key=lambda one: one.t_ns)
         self._pending = []
-        # what happened to the platform names the dump, not who died on the way
-        first = min(triggers, key=lambda one: one.slug.startswith("died"))
+        first = min(triggers, key=_rank)
         utc = self._utc()
         try:
             data = collect(self._run_dir, triggers, now_ns, utc)
@@ -149,12 +151,28 @@ class Watch:
             return []
         found = []
         with contextlib.suppress(ValueError, KeyError, TypeError):
-            for at, name, status in json.loads(message[1])["deaths"]:
+            for at, name, status, pid in json.loads(message[1])["deaths"]:
                 if at > self._seen_death_ns:
-                    text = f"the {name} {_how(int(status))}"
-                    found.append(Trigger(int(at), slug_of(f"died {name}"), text))
+                    # the spare has become the guard if it ever said so
+                    who = "guard" if "guard" in name and self._was_guard(pid) else name
+                    text = f"the {who}, process {pid}, {_how(int(status))}"
+                    found.append(Trigger(int(at), slug_of(f"died {who}"), text))
             self._seen_death_ns = max([self._seen_death_ns, *(one.t_ns for one in found)])
         return found
+
+    def _was_guard(self, pid: int) -> bool:
+        events = [] if self._events is None else self._events.since()
+        with contextlib.suppress(ValueError):
+            return any(
+                event["what"] == "guard" and event["pid"] == pid
+                for event in (json.loads(data) for _, data in events)
+            )
+        return False
+
+
+def _rank(trigger: Trigger) -> int:
+    """What names a dump: first what happened to the platform, then who died, by weight."""
+    return _WEIGHT.index(trigger.slug) + 1 if trigger.slug in _WEIGHT else 0
 
 
 def _how(status: int) -> str:
