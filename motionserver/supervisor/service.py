@@ -62,11 +62,18 @@ class Service:
         web = dict(resolved["web"])
         core = {key: value for key, value in resolved.items() if key != "web"}
         self._clean()
-        for name, content in (("config.json", core), ("web.json", web)):
-            # keys of signed sources are in it
-            (run_dir / name).touch(mode=0o600)
-            (run_dir / name).write_text(json.dumps(content), "utf-8")
-        self._maps = Maps(run_dir, create=True)
+        try:
+            for name, content in (("config.json", core), ("web.json", web)):
+                # keys of signed sources are in it
+                (run_dir / name).touch(mode=0o600)
+                (run_dir / name).write_text(json.dumps(content), "utf-8")
+            self._maps = Maps(run_dir, create=True)
+        except OSError as error:
+            self._link.close()
+            self._lock.close()
+            raise ConfigError(
+                "[server] run_dir", f"{run_dir}: {error.strerror}", "Give a folder with 1 MB free."
+            ) from error
         descriptor = self._link.fileno()
         guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
         self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
@@ -149,7 +156,7 @@ class Service:
         await asyncio.gather(
             self.planner.end(signal.SIGTERM, 3.0),
             self.web.end(signal.SIGTERM, 3.0),
-            self.box.end(signal.SIGTERM, BOX_PATIENCE),
+            self.box.end(signal.SIGINT, BOX_PATIENCE),
         )
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)

@@ -7,13 +7,13 @@ import logging
 import os
 import signal
 import sys
-import threading
 import time
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from motionserver.telemetry.blackbox.dump import Trigger
+from motionserver.telemetry.blackbox.room import FOLDER, free_memory
 from motionserver.telemetry.blackbox.watch import Watch
 from motionserver.telemetry.link import GuardClock
 from motionserver.telemetry.mapped import MappedFile
@@ -30,10 +30,12 @@ _POLITE: Final = 10
 
 
 def main() -> int:
-    """Watch until told to end; after the service's death until the guard has parked."""
-    told = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: told.set())
+    """Watch until SIGINT, by which the service ends it; after its death until the guard ends."""
+    told: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: told.append(number))
+    # also sent to all processes at once, and while the service's last threads still live: whether
+    # the service has died is asked, not concluded
+    signal.signal(signal.SIGTERM, lambda *_: None)
     parent = os.getppid()
     follow_parent()
     with contextlib.suppress(OSError):
@@ -41,18 +43,23 @@ def main() -> int:
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, folder, kept = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     watch = Watch(run_dir, folder, kept, lambda: datetime.now(UTC))
+    room = (run_dir / FOLDER).resolve()
     clock = MappedFile(run_dir / "clock.map")
-    while not told.wait(POLL):
+    while not told and os.getppid() == parent:
         watch.look(time.monotonic_ns())
         watch.tell(time.monotonic_ns(), os.getpid())
-    watch.look(time.monotonic_ns())
-    if os.getppid() != parent:
+        time.sleep(POLL)
+    watch.look(0)
+    if not told:
         died = time.monotonic_ns()
         watch.add(Trigger(died, "died-service", "the service died"))
         while time.monotonic_ns() - died < LONGEST * 1e9 and _is_heard(clock):
             time.sleep(POLL)
         watch.look(0)
     watch.finish(time.monotonic_ns())
+    if not told:
+        # nobody else would, before another server starts here
+        free_memory(room)
     return 0
 
 

@@ -23,6 +23,7 @@ PACKETS_PER_SECOND: Final = 250
 _PLANS: Final = 32
 _EVENTS: Final = 512
 _MEMORY: Final = Path("/dev/shm")
+_PREFIX: Final = "motionserver-"
 _IN_MEMORY: Final = ("tmpfs", "ramfs")
 
 
@@ -42,7 +43,7 @@ def make_room(run_dir: Path, rate_hz: float, plan_hz: float) -> None:
     folder = run_dir / FOLDER
     clear_room(run_dir)
     if not _is_in_memory(run_dir) and os.access(_MEMORY, os.W_OK):
-        folder.symlink_to(tempfile.mkdtemp(prefix="motionserver-", dir=_MEMORY))
+        folder.symlink_to(tempfile.mkdtemp(prefix=_PREFIX, dir=_MEMORY))
     else:
         folder.mkdir(mode=0o700)
     periods = ceil(KEPT * plan_hz)
@@ -67,11 +68,15 @@ def clear_room(run_dir: Path) -> None:
     folder = run_dir / FOLDER
     with contextlib.suppress(OSError):
         if folder.is_symlink():
-            target = folder.resolve()
+            free_memory(folder.resolve())
             folder.unlink()
-            if target.parent == _MEMORY and target.name.startswith("motionserver-"):
-                shutil.rmtree(target, ignore_errors=True)
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def free_memory(room: Path) -> None:
+    """Remove histories that lie in memory but outside the run directory."""
+    if room.parent == _MEMORY and room.name.startswith(_PREFIX):
+        shutil.rmtree(room, ignore_errors=True)
 
 
 def _is_in_memory(path: Path) -> bool:
