@@ -141,7 +141,9 @@ def demo(
     fault: Annotated[
         str,
         typer.Option(
-            "--fault", help="cue-loss, planner-kill, web-kill, platform-loss or nan", metavar="F"
+            "--fault",
+            help="cue-loss, planner-kill, guard-kill, web-kill, platform-loss or nan",
+            metavar="F",
         ),
     ] = "",
     recording: Annotated[

@@ -139,7 +139,11 @@ class Demo:
             replay.kill()
         if self.fault == "nan":
             self._nan = asyncio.create_task(send_nan(("127.0.0.1", cue)))
-        victim = {"planner-kill": service.planner, "web-kill": service.web}.get(self.fault)
+        victim = {
+            "planner-kill": service.planner,
+            "web-kill": service.web,
+            "guard-kill": service.active_guard,
+        }.get(self.fault)
         if victim is not None:
             victim.signal(signal.SIGKILL)
 

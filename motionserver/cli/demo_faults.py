@@ -16,6 +16,7 @@ FAULTS: Final = {
     "nan": "PARKED",
     "planner-kill": "PARKED",
     "web-kill": "RUN",
+    "guard-kill": "RUN",
     "platform-loss": "FAULT",
 }
 """Fault by name, and the state that must have been reached after it."""

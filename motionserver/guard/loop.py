@@ -13,9 +13,11 @@ from typing import Any, Final
 
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
+from motionserver.core.safety.inherit import inherit
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.states import RAISED, State
 from motionserver.core.safety.supervisor import is_standing
+from motionserver.core.safety.will import will_of
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
 from motionserver.guard.snapshot import snapshot
@@ -55,6 +57,7 @@ class GuardLoop:
         self._sent_slot = -1
         self._sends: deque[int] = deque(maxlen=120)
         self._snapshot_ns = 0
+        self._taken_ns = 0
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
         self._start_ns = now_ns()
@@ -74,16 +77,30 @@ class GuardLoop:
         gc.freeze()
         gc.disable()
         ticker = Ticker(self._wake)
-        self._start_ns = now_ns()
-        self._last_ns = self._start_ns
+        self._begin(now_ns())
         self._ticker = ticker
-        ticker.arm(int(self._start_ns + self._tick_ns))
+        ticker.arm(int(self._start_ns + (self._tick + 1) * self._tick_ns))
         machine = self.guard.machine
         log.info("guard ready, limits %s of %s; %s", machine.digest, machine.name, self.scheduling)
         try:
             return await self._done
         finally:
             ticker.close()
+
+    def _begin(self, now: int) -> None:
+        """Start the clock; after another guard in its rhythm, so that no packet comes too soon."""
+        self._start_ns = self._last_ns = now
+        will = self._ports.left()
+        if will is None:
+            return
+        if inherit(self.guard, will, now):
+            self._taken_ns = now
+        send_ns = self._ticks_per_send * self._tick_ns
+        slots = (now - will.due_ns) // send_ns + 1
+        self.guard.record.counters["missed_slots"] += max(0, int(slots))
+        # slot 0 is the one the guard before has sent in, or missed
+        self._start_ns = int(will.due_ns + (slots - 1) * send_ns)
+        self._tick, self._sent_slot = int((now - self._start_ns) / self._tick_ns), 0
 
     def ask_to_leave(self, why: str) -> None:
         """Park and end; asking again does not hurry it."""
@@ -133,14 +150,16 @@ class GuardLoop:
                 counters["missed_slots"] += send_slot - self._sent_slot - 1
             self._sent_slot = send_slot
             self._sends.append(now)
+        due = int(self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns)
         # the planner must know of an acceptance at once, or it continues the wrong parent
         if setpoint is not None or self._ports.has_news(self.guard.record):
-            due = self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns
-            self._ports.publish(
-                self._sends[-1] if self._sends else now, now, int(due), self.guard.record
-            )
+            sent = self._sends[-1] if self._sends else now
+            self._ports.publish(sent, now, due, self.guard.record)
         is_sent = setpoint is not None and self._ports.send(setpoint)
-        self._setpoint = setpoint or self._setpoint
+        if setpoint is not None:
+            self._setpoint = setpoint
+            newest = self.guard.supervisor.device.newest
+            self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))
         self._box.note(given, setpoint, answers, is_sent)
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):

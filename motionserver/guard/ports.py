@@ -16,6 +16,7 @@ from motionserver.core.plan import Plan, pack, unpack
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.watchdog import CueStatus
+from motionserver.core.safety.will import Will, WillWriter, unpack_will
 from motionserver.guard.options import GuardOptions
 from motionserver.platforms.base import PlatformPacketError
 from motionserver.platforms.registry import make_platform
@@ -45,6 +46,7 @@ class Ports:
         self._seen_cue = 0
         self._accepted_id = 0
         self._keep = keep
+        self._writer = WillWriter()
 
     def feedback(self) -> tuple[Feedback, ...]:
         """Answers of the device that wait, at most `DRAIN`; everything else is counted."""
@@ -128,6 +130,24 @@ class Ports:
             return False
         self._counters["packets_sent"] += 1
         return True
+
+    def leave(self, will: Will) -> None:
+        """Write down what a successor needs; what is too long for its file is counted."""
+        try:
+            self._maps.will.write(self._writer.pack(will))
+        except ValueError:
+            self._counters["wills_too_long"] += 1
+
+    def left(self) -> Will | None:
+        """What the guard before left; None if there was none, or it cannot be read."""
+        message = self._maps.will.read()
+        if message is None:
+            return None
+        try:
+            return unpack_will(message[1])
+        except ValueError:
+            self._counters["wills_malformed"] += 1
+            return None
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

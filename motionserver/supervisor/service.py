@@ -16,8 +16,10 @@ from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
 from motionserver.supervisor.addresses import open_link, try_addresses
 from motionserver.supervisor.child import Child
+from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
 from motionserver.telemetry.blackbox.room import clear_room, make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
+from motionserver.telemetry.notify import Notifier
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
@@ -83,6 +85,7 @@ class Service:
         self.web.wanted = config_web
         self.box = self._black_box(resolved)
         self._leave = asyncio.Event()
+        self._manager = Notifier()
         self.exit_status = 0
 
     def _black_box(self, resolved: dict[str, Any]) -> Child:
@@ -146,12 +149,15 @@ class Service:
             loop.add_signal_handler(number, self.leave)
         children = (*self.guards, self.planner, self.web, self.box)
         keepers = [asyncio.create_task(child.keep()) for child in children]
-        watcher = asyncio.create_task(self._show())
+        watchers = [asyncio.create_task(self._show()), asyncio.create_task(self._feel_pulse())]
+        teller = asyncio.create_task(self._tell_manager())
         await self._leave.wait()
         log.info("parking")
+        self._manager.tell(STOPPING=1, STATUS="parking")
         self.planner.wanted = self.web.wanted = False
         self.exit_status = await self._park()
-        watcher.cancel()
+        for watcher in watchers:
+            watcher.cancel()
         # the black box may be writing down how the guard ended
         await asyncio.gather(
             self.planner.end(signal.SIGTERM, 3.0),
@@ -160,6 +166,9 @@ class Service:
         )
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
+        teller.cancel()
+        ended = "parked" if self.exit_status == 0 else "standing in a fault"
+        self._manager.tell(STATUS=f"ended {ended}")
         self._link.close()
         self._clean()
         self._lock.close()
@@ -193,6 +202,11 @@ class Service:
         message = self._maps.clock.read()
         return message is None or STATES[GuardClock.unpack(message[1]).state] not in CUED
 
+    @property
+    def active_guard(self) -> Child:
+        """The guard that moves the platform."""
+        return self._active()[0]
+
     def _active(self) -> tuple[Child, Child]:
         """The guard that holds the lock, by its own word, and the other."""
         message = self._maps.guard.read()
@@ -206,6 +220,33 @@ class Service:
         return sorted(
             (at, child.name, status, pid) for child in everybody for at, status, pid in child.deaths
         )
+
+    async def _feel_pulse(self) -> None:
+        """Kill a guard that stands still, so that the spare gets the lock."""
+        pulse, loop = Pulse(), asyncio.get_running_loop()
+        while True:
+            active, _ = self._active()
+            message = self._maps.clock.read()
+            written = 0 if message is None else GuardClock.unpack(message[1]).written_ns
+            pid = active.pid
+            runnable = pid is not None and is_runnable(pid)
+            if pulse.look(loop.time(), pid, written, runnable):
+                log.error("%s stands still; killed, the spare takes over", active.name)
+                active.signal(signal.SIGKILL)
+            await asyncio.sleep(POLL)
+
+    async def _tell_manager(self) -> None:
+        """Ready once the guard shows itself; then how it goes, and that we are alive."""
+        ready, pause = False, self._manager.watchdog / 3.0 or 1.0
+        while True:
+            message = self._maps.guard.read()
+            if message is not None:
+                shown = json.loads(message[1])
+                more = {} if ready else {"READY": 1}
+                ready = True
+                status = f"{shown['state']}: {shown['reason']}"
+                self._manager.tell(**more, WATCHDOG=1, STATUS=status)
+            await asyncio.sleep(pause if ready else 0.05)
 
     async def _show(self) -> None:
         """Tell the page who lives."""

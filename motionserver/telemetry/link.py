@@ -7,6 +7,7 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Final
 
+from motionserver.core.motion.player import MOST_PENDING
 from motionserver.core.plan import MAX_KNOTS
 from motionserver.core.safety.states import State
 from motionserver.core.safety.watchdog import CueStatus
@@ -18,6 +19,7 @@ STATES: Final = tuple(State)
 _CLOCK: Final = struct.Struct("<BQdQQQ")
 _CUE: Final = struct.Struct("<QQBQ")
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
+_WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,7 @@ class Maps:
         accepted: Guard to planner: the newest accepted plan.
         clock: Guard to planner: `GuardClock`.
         cue: Planner to guard: the source's status.
+        will: Guard to its successor: `core.safety.will.Will`, with every packet.
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
@@ -88,6 +91,7 @@ class Maps:
         self.accepted = opened("accepted", PLAN_BYTES)
         self.clock = opened("clock", _CLOCK.size)
         self.cue = opened("cue", _CUE.size)
+        self.will = opened("will", _WILL_BYTES)
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)

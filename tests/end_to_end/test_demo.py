@@ -29,7 +29,7 @@ def test_the_demo_runs_and_parks(tmp_path: Path) -> None:
 @pytest.mark.campaign
 @pytest.mark.parametrize("algorithm", ["classical", "thondel2014"])
 @pytest.mark.parametrize(
-    "fault", ["", "cue-loss", "nan", "planner-kill", "web-kill", "platform-loss"]
+    "fault", ["", "cue-loss", "nan", "planner-kill", "guard-kill", "web-kill", "platform-loss"]
 )
 def test_every_fault_of_the_demo_is_answered(tmp_path: Path, fault: str, algorithm: str) -> None:
     demo(tmp_path, "--algorithm", algorithm, *(("--fault", fault) if fault else ()))

@@ -201,11 +201,11 @@ class BoxedBench(Bench):
         inner = self.guard.tick
 
         def tick(given: TickInput):
+            self.box.ticked(1000)
             setpoint, answers = inner(given)
             playback = self.guard.record.playback
             if given.proposal is not None and playback is not None:
                 self.box.accepted(pack(playback.newest.plan))
-            self.box.ticked(1000)
             self.box.note(given, setpoint, answers, setpoint is not None)
             return setpoint, answers
 
@@ -241,6 +241,15 @@ def test_a_virtual_fault_is_dumped_as_it_was_played(scene, tmp_path):
     assert count == len(data["guard_rows"]["rows"])
     with pytest.raises(DumpError, match="there already"):
         write_csv(data, tmp_path / "out.csv")
+
+
+def test_a_successor_goes_on_in_the_state_it_found(scene):
+    b = BoxedBench(compact())
+    b.engaged()
+    b.boxed(scene.run_dir)
+    b.run(0.2)
+    events = [json.loads(data) for _, data in scene.events.since()]
+    assert [event["what"] for event in events if event["what"] in ("state", "guard")] == ["guard"]
 
 
 def test_what_is_no_dump_is_refused_in_words(tmp_path):

@@ -8,7 +8,7 @@ from motionserver.core.axes import Array
 from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import rest_to_rest, straight_way, straight_ways
 from motionserver.core.plan import Plan, rest_at
-from motionserver.core.safety.shape import well_formed
+from motionserver.core.safety.shape import continues, well_formed
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.core.safety.verify import (
     AHEAD,
@@ -120,6 +120,33 @@ def accept_move(
     if rejection is not None:
         return rejection
     return AcceptedPlan(plan, parent.plan, _home_bound(machine, goal, homes))
+
+
+def accept_again(
+    machine: Machine, plan: Plan, before: Plan | None, homes: Array
+) -> AcceptedPlan | Rejection:
+    """Accept what another guard had accepted: the same rules, but for its instant.
+
+    Args:
+        machine: Geometry and hard limits.
+        plan: What was accepted: a proposal, a rest or a move.
+        before: The plan it took over from; None for a rest.
+        homes: Poses (H, 6) that must be reachable straight from its rest pose.
+
+    Returns:
+        The accepted plan, or why not.
+    """
+    rejection = well_formed(plan, LONGEST_MOVE)
+    if rejection is None and before is not None:
+        rejection = well_formed(before, LONGEST_MOVE) or continues(plan, before)
+    rejection = (
+        rejection
+        or check_legs(machine, plan, before or plan, None, GUARD_MARGINS)
+        or check_ways_home(machine, plan.rest_pose, homes, GUARD_MARGINS)
+    )
+    if rejection is not None:
+        return rejection
+    return AcceptedPlan(plan, before, _home_bound(machine, plan.rest_pose, homes))
 
 
 def _home_bound(machine: Machine, rest: Array, homes: Array) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from motionserver.core.device import Phase
+from motionserver.core.device import Feedback, Phase
 from motionserver.core.limits import Machine
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.record import GuardRecord
@@ -133,6 +133,13 @@ class Supervisor:
             yield Event.HOLD_EXPIRED
         if source.silent_for(now_ns) > patience.silence:
             yield Event.SOURCE_SILENT
+
+    def resume(self, feedback: Feedback | None, accepted_ns: int, now_ns: int) -> None:
+        """Take the place of a supervisor that ended: answers and plans are waited for anew."""
+        if feedback is not None:
+            self.device.answered(feedback)
+            self.device.excuse(now_ns)
+        self._excused = (accepted_ns, now_ns)
 
     def why(self, event: Event, now_ns: int) -> str:
         """What happened, with its figures, for people."""

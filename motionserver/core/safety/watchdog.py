@@ -178,13 +178,17 @@ class DeviceWatch:
             return False
         gap = np.abs(measured - legs)
         self.error = float(gap.max())
-        allowed = self._patience.track + self._patience.track_lag * np.abs(speeds)
-        if bool(np.all(gap <= allowed)):
+        if bool(np.all(gap <= self.allowed(speeds))):
             self._astray_since = None
             return False
         if self._astray_since is None:
             self._astray_since = now_ns
         return (now_ns - self._astray_since) / SECOND > self._patience.track_time
+
+    def allowed(self, speeds: Array) -> Array:
+        """Tracking error that is always allowed at commanded leg speeds (6,) [m/s]: (6,) [m]."""
+        largest: Array = self._patience.track + self._patience.track_lag * np.abs(speeds)
+        return largest
 
     def forgive(self) -> None:
         """Start tracking anew: the platform is about to be told something else."""

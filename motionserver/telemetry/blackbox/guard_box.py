@@ -49,7 +49,12 @@ class GuardBox:
         self._last: Setpoint | None = None
 
     def ticked(self, late_ns: int) -> None:
-        """Note how late a tick is [ns]."""
+        """Note how late a tick is [ns]; before the tick."""
+        if self._state is None:
+            # a successor begins in the state, and with the events, of the guard before it
+            record = self._guard.record
+            self._state = record.state
+            self._seen_event = record.events[-1][0] if record.events else 0
         self._late_ns = max(self._late_ns, late_ns)
         self._ticks += 1
 
@@ -141,8 +146,7 @@ class GuardBox:
 
     def _note_events(self, given: TickInput, answers: Sequence[str]) -> None:
         record, now = self._guard.record, given.now_ns
-        is_first = self._state is None
-        if is_first:
+        if not self._counted_ns:
             self._event(now, "guard", pid=os.getpid())
         before, self._state = self._state or State.OFFLINE, record.state
         said = ""

@@ -1,0 +1,94 @@
+"""Taking over from a guard that ended: check what it left, and go on with the next sample."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from motionserver.core.device import Phase
+from motionserver.core.kinematics.hexapod import leg_motion
+from motionserver.core.motion.player import Playback, state_now
+from motionserver.core.safety.accept import accept_again
+from motionserver.core.safety.act import Guard
+from motionserver.core.safety.states import State
+from motionserver.core.safety.verdict import AcceptedPlan, Rejection
+from motionserver.core.safety.watchdog import SECOND
+from motionserver.core.safety.will import Will
+
+LONGEST_GAP: Final = 0.1
+"""Age of the packet that was due up to which the next sample is still soft [s]: later the platform
+stands, and what follows must begin at rest."""
+QUIET: Final = 1.0
+"""A guard that took over lives at least so long, or its successor does not go on as it did [s]:
+what it was left may be what killed it."""
+
+
+def inherit(guard: Guard, will: Will, now_ns: int) -> bool:
+    """Let a fresh guard take the place of the one that left ``will``.
+
+    Latched states stay latched however old the will is, and an edge that was used stays used. The
+    plans are checked again from the beginning: nothing is believed but the bytes.
+
+    Args:
+        guard: A guard that has not ticked yet.
+        will: What the one before left.
+        now_ns: Now [ns].
+
+    Returns:
+        True if the same plan goes on; False if it must begin from where the platform is measured.
+    """
+    record = guard.record
+    record.leaving, record.engaged_once = will.leaving, will.engaged_once
+    record.next_id, record.accepted_ns = will.next_id, will.accepted_ns
+    record.counters.update(will.counters)
+    record.counters["takeovers"] += 1
+    latched = will.state in (State.FAULT, State.SAFE)
+    late = (now_ns - will.due_ns) / SECOND
+    playback: Playback | None = None
+    why = ""
+    if late > LONGEST_GAP:
+        why = f"its packet was due {late * 1e3:.0f} ms ago"
+    elif will.taken_ns and now_ns - will.taken_ns < QUIET * SECOND:
+        why = "it had taken over itself just before"
+    elif will.plans:
+        found = _played(guard, will)
+        why = str(found) if isinstance(found, Rejection) else _astray(guard, will, found)
+        playback = None if why or isinstance(found, Rejection) else found
+    if why and not latched:
+        record.note(now_ns, f"the guard before ended in {will.state}; begins anew: {why}")
+        return False
+    record.state, record.reason, record.since_ns = will.state, will.reason, will.since_ns
+    record.deadline_ns, record.playback = will.deadline_ns, playback
+    guard.supervisor.resume(will.feedback, record.accepted_ns, now_ns)
+    how = "stays" if why else "goes on"
+    record.note(now_ns, f"the guard before ended in {will.state}; {how} in it")
+    return True
+
+
+def _astray(guard: Guard, will: Will, playback: Playback) -> str:
+    """Why the raised platform cannot be where the plan's clock says; empty if it can."""
+    if will.feedback is None or will.feedback.phase is not Phase.UP:
+        return ""
+    device, state = guard.supervisor.device, state_now(playback)
+    device.answered(will.feedback)
+    legs, speeds, _ = leg_motion(
+        guard.machine, state.pose[None], state.velocity[None], state.acceleration[None]
+    )
+    measured = device.legs()
+    if measured is None or bool((np.abs(measured - legs[0]) <= device.allowed(speeds[0])).all()):
+        return ""
+    return f"the platform is {1e3 * np.abs(measured - legs[0]).max():.0f} mm from its plan"
+
+
+def _played(guard: Guard, will: Will) -> Playback | Rejection:
+    """What was played and waited, each plan accepted again."""
+    accepted: list[AcceptedPlan] = []
+    before = will.before
+    for plan in will.plans:
+        verdict = accept_again(guard.machine, plan, before, guard.homes)
+        if isinstance(verdict, Rejection):
+            return verdict
+        accepted.append(verdict)
+        before = plan
+    return Playback(accepted[0], will.clock, tuple(accepted[1:]))

@@ -1,0 +1,141 @@
+"""What a guard leaves behind with every packet: enough for a spare to send the very next one."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Final
+
+from motionserver.core.axes import frozen
+from motionserver.core.device import Feedback, Phase
+from motionserver.core.plan import Plan, pack, unpack
+from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.states import State
+
+_LENGTH: Final = struct.Struct("<I")
+
+
+@dataclass(frozen=True, slots=True)
+class Will:
+    """The part of a guard's record that its successor needs.
+
+    Attributes:
+        due_ns: When the packet after the last one is due [ns].
+        state: Motion state.
+        reason: Why it is in this state.
+        since_ns: When it was entered [ns].
+        deadline_ns: When raising or parking has taken too long [ns].
+        accepted_ns: When the last proposal was accepted [ns].
+        leaving: True once the service is to end.
+        engaged_once: True once "auto" has used its single edge.
+        next_id: Number of the guard's last own plan.
+        taken_ns: When this guard itself took over from another [ns]; 0 = never.
+        clock: Own time of the played plan at the last packet [s].
+        feedback: The device's newest answer.
+        counters: Everything counted so far.
+        before: The plan the played one took over from; None for a rest.
+        plans: The played one, then those that wait; empty if nothing is played.
+    """
+
+    due_ns: int
+    state: State
+    reason: str
+    since_ns: int
+    deadline_ns: int
+    accepted_ns: int
+    leaving: bool
+    engaged_once: bool
+    next_id: int
+    taken_ns: int
+    clock: float
+    feedback: Feedback | None
+    counters: dict[str, int]
+    before: Plan | None
+    plans: tuple[Plan, ...]
+
+
+_PLAIN: Final = tuple(f.name for f in fields(Will) if f.name not in ("feedback", "before", "plans"))
+
+
+def will_of(record: GuardRecord, feedback: Feedback | None, taken_ns: int, due_ns: int) -> Will:
+    """Write down what a successor needs."""
+    playback = record.playback
+    accepted = () if playback is None else (playback.playing, *playback.pending)
+    return Will(
+        due_ns,
+        record.state,
+        record.reason,
+        record.since_ns,
+        record.deadline_ns,
+        record.accepted_ns,
+        record.leaving,
+        record.engaged_once,
+        record.next_id,
+        taken_ns,
+        0.0 if playback is None else playback.clock,
+        feedback,
+        dict(record.counters),
+        accepted[0].before if accepted else None,
+        tuple(each.plan for each in accepted),
+    )
+
+
+class WillWriter:
+    """Packs wills; a plan is packed once for all the packets it lives."""
+
+    def __init__(self) -> None:
+        self._packed: dict[int, bytes] = {}
+
+    def pack(self, will: Will) -> bytes:
+        """As bytes, for a mapped file."""
+        plans = will.plans if will.before is None else (will.before, *will.plans)
+        self._packed = {
+            plan.plan_id: self._packed.get(plan.plan_id) or pack(plan) for plan in plans
+        }
+        head = {name: getattr(will, name) for name in _PLAIN}
+        head["has_before"] = will.before is not None
+        head["feedback"] = None if will.feedback is None else _plain(will.feedback)
+        parts = [json.dumps(head).encode(), *(self._packed[plan.plan_id] for plan in plans)]
+        return b"".join(_LENGTH.pack(len(part)) + part for part in parts)
+
+
+def unpack_will(data: bytes) -> Will:
+    """Read what `WillWriter.pack` wrote.
+
+    Raises:
+        ValueError: The bytes are no will.
+    """
+    try:
+        parts, at = [], 0
+        while at < len(data):
+            (length,) = _LENGTH.unpack_from(data, at)
+            parts.append(data[at + 4 : at + 4 + length])
+            at += 4 + length
+        head = json.loads(parts[0])
+        plans = [unpack(part) for part in parts[1:]]
+        before = plans.pop(0) if head.pop("has_before") else None
+        feedback = head.pop("feedback")
+        return Will(
+            **head | {"state": State(head["state"])},
+            feedback=None if feedback is None else _feedback(feedback),
+            before=before,
+            plans=tuple(plans),
+        )
+    except (ValueError, KeyError, IndexError, TypeError, struct.error) as error:
+        raise ValueError(f"will of a guard: {error}") from error
+
+
+def _plain(feedback: Feedback) -> dict[str, Any]:
+    out = asdict(feedback)
+    for name in ("legs", "pose"):
+        out[name] = None if out[name] is None else out[name].tolist()
+    return out
+
+
+def _feedback(plain: dict[str, Any]) -> Feedback:
+    arrays = {
+        name: None if plain[name] is None else frozen(plain[name]) for name in ("legs", "pose")
+    }
+    faults = tuple(str(fault) for fault in plain["faults"])
+    return Feedback(**plain | arrays | {"phase": Phase(plain["phase"]), "faults": faults})
