@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from motionserver.cli.blackbox_text import box_status
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import machine_from_mapping
 from motionserver.errors import MotionServerError
@@ -109,6 +110,7 @@ def status_text(path: Path | None, as_json: bool) -> str:
     ):
         message = source.read()
         parts[name] = None if message is None else json.loads(message[1])
+    parts["blackbox"] = box = box_status(run_dir)
     guard, planner = parts["guard"], parts["planner"]
     if guard is not None and (age := now_ns() - guard["t_ns"]) > SILENT_NS:
         raise NotRunningError(
@@ -138,6 +140,9 @@ def status_text(path: Path | None, as_json: bool) -> str:
         )
         side = planner["side"]
         lines += [_engine_line(engine) for engine in (side["driving"], *side["engines"])]
+    if box is not None:
+        failed = f", {box['failed']} not written: {box['error']}" if box["failed"] else ""
+        lines.append(f"black box  {box['dumps']} dumps since the start{failed}")
     return "\n".join(lines)
 
 

@@ -21,6 +21,7 @@ from motionserver.core.safety.will import will_of
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
 from motionserver.guard.snapshot import snapshot
+from motionserver.telemetry.blackbox.guard_box import GuardBox
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
@@ -40,7 +41,8 @@ class GuardLoop:
     ) -> None:
         self.options = options
         self.guard = Guard(options.guard)
-        self._ports = Ports(options, run_dir, link, self.guard.record.counters)
+        self._box = GuardBox(run_dir, self.guard)
+        self._ports = Ports(options, run_dir, link, self.guard.record.counters, self._box.accepted)
         self._requests = RequestServer(run_dir / "guard.sock")
         ticks = 1
         while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
@@ -109,7 +111,9 @@ class GuardLoop:
     def _wake(self) -> None:
         now = now_ns()
         slot = int((now - self._start_ns) / self._tick_ns)
-        self._lateness.ticked(int(now - self._start_ns - (self._tick + 1) * self._tick_ns))
+        late = int(now - self._start_ns - (self._tick + 1) * self._tick_ns)
+        self._lateness.ticked(late)
+        self._box.ticked(late)
         self._tick = slot
         try:
             self._step(now, slot)
@@ -151,11 +155,12 @@ class GuardLoop:
         if setpoint is not None or self._ports.has_news(self.guard.record):
             sent = self._sends[-1] if self._sends else now
             self._ports.publish(sent, now, due, self.guard.record)
+        is_sent = setpoint is not None and self._ports.send(setpoint)
         if setpoint is not None:
-            self._ports.send(setpoint)
             self._setpoint = setpoint
             newest = self.guard.supervisor.device.newest
             self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))
+        self._box.note(given, setpoint, answers, is_sent)
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):
             answer = {"ok": not refusal, "state": record.state, "reason": refusal or record.reason}

@@ -7,6 +7,7 @@ import os
 import socket
 import struct
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -29,7 +30,12 @@ class Ports:
     """All that comes in and goes out of the guard, but for requests."""
 
     def __init__(
-        self, options: GuardOptions, run_dir: Path, link: socket.socket, counters: Counter[str]
+        self,
+        options: GuardOptions,
+        run_dir: Path,
+        link: socket.socket,
+        counters: Counter[str],
+        keep: Callable[[bytes], None] = lambda _: None,
     ) -> None:
         self._format = make_platform(options.format, options.options)
         self._peer = options.peer
@@ -39,6 +45,7 @@ class Ports:
         self._seen_proposal = self._maps.proposal.newest_sequence()
         self._seen_cue = 0
         self._accepted_id = 0
+        self._keep = keep
         self._writer = WillWriter()
 
     def feedback(self) -> tuple[Feedback, ...]:
@@ -99,7 +106,9 @@ class Ports:
         playback = record.playback
         newest = None if playback is None else playback.newest.plan
         if newest is not None and newest.plan_id != self._accepted_id:
-            self._maps.accepted.write(pack(newest))
+            packed = pack(newest)
+            self._maps.accepted.write(packed)
+            self._keep(packed)
             self._accepted_id = newest.plan_id
         self._maps.clock.write(
             GuardClock(
@@ -112,13 +121,15 @@ class Ports:
             ).pack()
         )
 
-    def send(self, setpoint: Setpoint) -> None:
-        """Send a setpoint to the platform; what the network refuses is counted."""
+    def send(self, setpoint: Setpoint) -> bool:
+        """Send a setpoint to the platform; what the network refuses is counted, and False."""
         try:
             self._link.sendto(self._format.encode(setpoint), self._peer)
-            self._counters["packets_sent"] += 1
         except OSError:
             self._counters["send_errors"] += 1
+            return False
+        self._counters["packets_sent"] += 1
+        return True
 
     def leave(self, will: Will) -> None:
         """Write down what a successor needs; what is too long for its file is counted."""

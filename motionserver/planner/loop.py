@@ -29,6 +29,7 @@ from motionserver.planner.reply import status_packet
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
+from motionserver.telemetry.blackbox.planner_box import PlannerBox
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.realtime import take_priority
@@ -64,6 +65,7 @@ class PlannerLoop:
         self._measured_ns = 0
         self._timing = Timing(int(options.period * SECOND))
         self._view = PlannerView()
+        self._box = PlannerBox(run_dir)
         self._seldom = Seldom(log)
         self._status_ns = 0
         self._snapshot_ns = 0
@@ -120,6 +122,7 @@ class PlannerLoop:
 
     def _step(self, now: int) -> None:
         vehicle, sensor = self._inputs.poll()
+        self._box.packets((*vehicle, *sensor))
         for motion in vehicle:
             self._intake.offer(motion)
         self._state = self._clock.read(now)
@@ -144,10 +147,15 @@ class PlannerLoop:
             self._sides.think(stimulus, self._due_ns + int(self.options.period * SECOND))
         elif self._state not in CUED:
             self._sides.stand()
-        self._show(now, stimulus)
+        self._show(now, stimulus, handover is not None)
 
-    def _show(self, now: int, stimulus: Stimulus) -> None:
-        self._maps.trace.write(self._view.trace(now, stimulus, self._thinker, self._sides))
+    def _show(self, now: int, stimulus: Stimulus, has_thought: bool) -> None:
+        trace = self._view.trace(
+            now, stimulus, self._thinker, self._sides, self._timing, has_thought
+        )
+        self._maps.trace.write(trace)
+        self._box.period(trace)
+        self._box.count(now, lambda: self._view.counted(self._inputs, self._sides))
         if now - self._snapshot_ns > SNAPSHOT_NS:
             self._snapshot_ns = now
             self._maps.planner.write(
@@ -175,7 +183,9 @@ class PlannerLoop:
         )
         took = now_ns() - begun
         if thought.proposal is not None:
-            self._maps.proposal.write(pack(thought.proposal.plan))
+            packed = pack(thought.proposal.plan)
+            self._maps.proposal.write(packed)
+            self._box.proposed(packed)
             self._clock.proposed(thought.proposal.plan)
         self._timing.thought(now_ns() - now)
         scores, proposal = self._sides.driving, thought.proposal

@@ -30,13 +30,16 @@ class Timing:
     def __init__(self, period_ns: int) -> None:
         self.lateness = Lateness(period_ns)
         self._thoughts: deque[int] = deque(maxlen=1024)
+        self.late_ns = self.last_ns = 0
 
     def woke(self, late_ns: int) -> None:
         """Note a wake-up."""
-        self.lateness.ticked(max(0, late_ns))
+        self.late_ns = max(0, late_ns)
+        self.lateness.ticked(self.late_ns)
 
     def thought(self, took_ns: int) -> None:
         """Note how long a plan took, from waking to proposing."""
+        self.last_ns = took_ns
         self._thoughts.append(took_ns)
 
     @property
@@ -84,9 +87,18 @@ class PlannerView:
         elif thought.proposal.kappa < 1.0:
             self._counters["plans_halved"] += 1
 
-    def trace(self, now_ns: int, stimulus: Stimulus, thinker: Thinker, sides: Sides) -> bytes:
-        """What a recorder keeps of every period; see `telemetry.trace`."""
+    def trace(
+        self,
+        now_ns: int,
+        stimulus: Stimulus,
+        thinker: Thinker,
+        sides: Sides,
+        timing: Timing,
+        has_thought: bool,
+    ) -> bytes:
+        """What recorder and black box keep of every period; see `telemetry.trace`."""
         proposal = None if self._thought is None else self._thought.proposal
+        trouble = "" if self._thought is None else self._thought.trouble
         return Trace(
             now_ns,
             thinker.tuning.algorithm,
@@ -94,7 +106,28 @@ class PlannerView:
             tuple(stimulus.force.tolist()),
             tuple(self._felt.tolist()),
             {name: (*force.tolist(), kappa) for name, (force, kappa) in sides.forces().items()},
+            proposal.plan.plan_id if has_thought and proposal is not None else 0,
+            timing.last_ns * 1e-9 if has_thought else 0.0,
+            timing.late_ns * 1e-9,
+            trouble[:100] if has_thought else "",
         ).pack()
+
+    def counted(self, inputs: Inputs, sides: Sides) -> dict[str, Any]:
+        """What the black box keeps once a second: owner, last refusal, counters."""
+        owner = inputs.vehicle.owner
+        return {
+            "owner": None if owner is None else f"{owner.source} from {owner.address}",
+            "last_error": inputs.last_error[:300],
+            "counters": self._counted(inputs, sides),
+        }
+
+    def _counted(self, inputs: Inputs, sides: Sides) -> dict[str, int]:
+        return {
+            **inputs.counters,
+            **self._counters,
+            "lost_packets": inputs.vehicle.lost,
+            "switches": sides.switches,
+        }
 
     def snapshot(
         self,
@@ -152,12 +185,7 @@ class PlannerView:
             "kappa": None if proposal is None else proposal.kappa,
             "trouble": "" if thought is None else thought.trouble[:300],
             "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],
-            "counters": {
-                **inputs.counters,
-                **self._counters,
-                "lost_packets": gate.lost,
-                "switches": sides.switches,
-            },
+            "counters": self._counted(inputs, sides),
             "side": sides.shown(thinker.tuning.algorithm),
             "tuning": tuner.shown(),
             "tick": timing.lateness.summary(),

@@ -37,6 +37,7 @@ class ServerSection(Strict):
     state_dir: str = ""
     log_level: Literal["debug", "info", "warning"] = "info"
     realtime: bool = True
+    blackbox_kept: Annotated[int, Field(ge=0, le=1000)] = 20
 
 
 class PlatformSection(Strict):

@@ -77,6 +77,10 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         "dry_run": dry_run,
         "enable_input": config.operator.enable_input,
         "realtime": config.server.realtime,
+        "blackbox": {
+            "folder": str(state_dir_of(config) / "blackbox"),
+            "kept": config.server.blackbox_kept,
+        },
         "platform": {
             "format": platform.format,
             "options": asdict(options),

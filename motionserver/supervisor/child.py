@@ -7,11 +7,13 @@ import logging
 import os
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 from motionserver.telemetry.parent import PARENT
+from motionserver.telemetry.ticker import now_ns
 
 QUICK: Final = 5.0
 """A child that lived shorter than this is started again more slowly [s]."""
@@ -32,6 +34,7 @@ class Child:
         wanted: False once it shall not be started again.
         restarts: How often it was started again.
         exits: Exit status of each life.
+        deaths: Newest ends that nobody wanted: instant [ns], exit status, process id.
         may_start: Asked before each start after the first; it waits while the answer is no.
     """
 
@@ -41,6 +44,7 @@ class Child:
     wanted: bool = True
     restarts: int = 0
     exits: list[int] = field(default_factory=list)
+    deaths: deque[tuple[int, int, int]] = field(default_factory=lambda: deque(maxlen=8))
     may_start: Callable[[], bool] = lambda: True
     _process: asyncio.subprocess.Process | None = None
 
@@ -58,6 +62,8 @@ class Child:
             process = await self.start()
             status = await process.wait()
             self.exits.append(status)
+            if self.wanted:
+                self.deaths.append((now_ns(), status, process.pid))
             quick = time.monotonic() - began < QUICK
             pause = min(SLOWEST, max(0.1, 2.0 * pause)) if quick else 0.0
             await self._wait_to_restart(status, pause)

@@ -17,12 +17,15 @@ from motionserver.errors import ConfigError
 from motionserver.supervisor.addresses import open_link, try_addresses
 from motionserver.supervisor.child import Child
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
+from motionserver.telemetry.blackbox.room import clear_room, make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
 """Longest wait for the guard to park when the service ends [s]."""
+BOX_PATIENCE: Final = 10.0
+"""Longest wait for a dump when the service ends [s]."""
 LEFT: Final = (
     *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
     *("config.json", "web.json", "tuning.json"),
@@ -61,11 +64,18 @@ class Service:
         web = dict(resolved["web"])
         core = {key: value for key, value in resolved.items() if key != "web"}
         self._clean()
-        for name, content in (("config.json", core), ("web.json", web)):
-            # keys of signed sources are in it
-            (run_dir / name).touch(mode=0o600)
-            (run_dir / name).write_text(json.dumps(content), "utf-8")
-        self._maps = Maps(run_dir, create=True)
+        try:
+            for name, content in (("config.json", core), ("web.json", web)):
+                # keys of signed sources are in it
+                (run_dir / name).touch(mode=0o600)
+                (run_dir / name).write_text(json.dumps(content), "utf-8")
+            self._maps = Maps(run_dir, create=True)
+        except OSError as error:
+            self._link.close()
+            self._lock.close()
+            raise ConfigError(
+                "[server] run_dir", f"{run_dir}: {error.strerror}", "Give a folder with 1 MB free."
+            ) from error
         descriptor = self._link.fileno()
         guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
         self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
@@ -73,9 +83,25 @@ class Service:
         self.planner.may_start = self._is_not_cued
         self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
         self.web.wanted = config_web
+        self.box = self._black_box(resolved)
         self._leave = asyncio.Event()
         self._manager = Notifier()
         self.exit_status = 0
+
+    def _black_box(self, resolved: dict[str, Any]) -> Child:
+        """What keeps the last minute and writes it down; without room for it there is none."""
+        box, planner = resolved["blackbox"], resolved["planner"]
+        kept = box["kept"]
+        if kept:
+            try:
+                make_room(self.run_dir, resolved["platform"]["rate_hz"], 1.0 / planner["period"])
+            except OSError as error:
+                log.warning("no black box: no room for it (%s)", error.strerror)
+                kept = 0
+        where = (str(self.run_dir), box["folder"], str(kept))
+        child = Child("black box", ("-m", "motionserver.telemetry.blackbox", *where))
+        child.wanted = kept > 0
+        return child
 
     @staticmethod
     def _take(run_dir: Path) -> TextIO:
@@ -106,6 +132,7 @@ class Service:
         for pattern in LEFT:
             for stale in self.run_dir.glob(pattern):
                 stale.unlink(missing_ok=True)
+        clear_room(self.run_dir)
 
     def leave(self) -> None:
         """End softly: park, then stop everything."""
@@ -120,9 +147,8 @@ class Service:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.leave)
-        keepers = [
-            asyncio.create_task(child.keep()) for child in (*self.guards, self.planner, self.web)
-        ]
+        children = (*self.guards, self.planner, self.web, self.box)
+        keepers = [asyncio.create_task(child.keep()) for child in children]
         watchers = [asyncio.create_task(self._show()), asyncio.create_task(self._feel_pulse())]
         teller = asyncio.create_task(self._tell_manager())
         await self._leave.wait()
@@ -132,8 +158,11 @@ class Service:
         self.exit_status = await self._park()
         for watcher in watchers:
             watcher.cancel()
+        # the black box may be writing down how the guard ended
         await asyncio.gather(
-            self.planner.end(signal.SIGTERM, 3.0), self.web.end(signal.SIGTERM, 3.0)
+            self.planner.end(signal.SIGTERM, 3.0),
+            self.web.end(signal.SIGTERM, 3.0),
+            self.box.end(signal.SIGINT, BOX_PATIENCE),
         )
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
@@ -185,6 +214,13 @@ class Service:
         first, second = self.guards
         return (second, first) if second.pid == pid and pid is not None else (first, second)
 
+    def _deaths(self) -> list[tuple[int, str, int, int]]:
+        """Ends that nobody wanted, oldest first: instant [ns], who, exit status, process id."""
+        everybody = (*self.guards, self.planner, self.web, self.box)
+        return sorted(
+            (at, child.name, status, pid) for child in everybody for at, status, pid in child.deaths
+        )
+
     async def _feel_pulse(self) -> None:
         """Kill a guard that stands still, so that the spare gets the lock."""
         pulse, loop = Pulse(), asyncio.get_running_loop()
@@ -225,10 +261,13 @@ class Service:
                         "spare": spare.pid,
                         "planner": self.planner.pid,
                         "web": self.web.pid,
+                        "blackbox": self.box.pid,
+                        "deaths": self._deaths(),
                         "restarts": {
                             "guard": sum(child.restarts for child in self.guards),
                             "planner": self.planner.restarts,
                             "web": self.web.restarts,
+                            "blackbox": self.box.restarts,
                         },
                     }
                 ).encode()

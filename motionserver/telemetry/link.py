@@ -18,8 +18,8 @@ from motionserver.telemetry.trace import TRACE_BYTES
 STATES: Final = tuple(State)
 _CLOCK: Final = struct.Struct("<BQdQQQ")
 _CUE: Final = struct.Struct("<QQBQ")
-_PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
-_WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * _PLAN_BYTES
+PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
+_WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +87,8 @@ class Maps:
         def opened(name: str, capacity: int) -> MappedFile:
             return MappedFile(run_dir / f"{name}.map", capacity if create else None)
 
-        self.proposal = opened("proposal", _PLAN_BYTES)
-        self.accepted = opened("accepted", _PLAN_BYTES)
+        self.proposal = opened("proposal", PLAN_BYTES)
+        self.accepted = opened("accepted", PLAN_BYTES)
         self.clock = opened("clock", _CLOCK.size)
         self.cue = opened("cue", _CUE.size)
         self.will = opened("will", _WILL_BYTES)

@@ -61,9 +61,14 @@ class MappedFile:
     @staticmethod
     def _create(path: Path, capacity: int) -> None:
         temporary = path.with_suffix(f".{os.getpid()}")
-        with temporary.open("wb") as file:
-            file.write(_HEAD.pack(_MAGIC, capacity))
-            file.truncate(_HEAD.size + 2 * (_SLOT.size + capacity))
+        try:
+            with temporary.open("wb") as file:
+                # all room now: a page that a full disk refuses later kills whoever writes to it
+                os.posix_fallocate(file.fileno(), 0, _HEAD.size + 2 * (_SLOT.size + capacity))
+                file.write(_HEAD.pack(_MAGIC, capacity))
+        except OSError:
+            temporary.unlink()
+            raise
         temporary.chmod(0o600)
         temporary.rename(path)
 

@@ -1,4 +1,5 @@
 import os
+import resource
 import signal
 import struct
 import subprocess
@@ -87,6 +88,19 @@ def test_after_a_torn_header_the_whole_message_stays(path):
     raw = path.read_bytes()
     assert SLOT.unpack_from(raw, 8)[0] == 2
     assert again.read() == (3, b"three")
+
+
+def test_all_room_is_taken_at_once_and_a_full_disk_refuses_the_start(path):
+    MappedFile(path, 1 << 20)
+    assert path.stat().st_blocks * 512 >= 2 << 20
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, limits[1]))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            MappedFile(path.with_name("other.map"), 1 << 20)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(path.parent.iterdir()) == [path]
 
 
 @pytest.mark.parametrize("size", [0, 7, 8, 100])
