@@ -9,10 +9,10 @@ from starlette.responses import Response
 
 from motionserver.settings.fields import TuningError, algorithms
 from motionserver.settings.side_engines import side_names
-from motionserver.web.auth import Role
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import tuning_refusal
+from motionserver.web.tokens import Role
 
 
 def side_routes(desk: Desk) -> APIRouter:

@@ -11,10 +11,10 @@ from starlette.responses import Response
 from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes, default_for, describe
 from motionserver.settings.tuning_presets import Preset
-from motionserver.web.auth import Role
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import tuning_refusal
+from motionserver.web.tokens import Role
 
 _TAG: Final = re.compile(r'"([0-9]{1,15})"')
 
