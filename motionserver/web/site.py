@@ -28,7 +28,7 @@ def single_headers(pairs: list[tuple[bytes, bytes]], path: str) -> dict[str, str
     """The headers by name, of which none that decides something may come twice.
 
     Raises:
-        Refusal: One does (400).
+        Refusal: One does, or the body has two lengths (400).
     """
     headers: dict[str, str] = {}
     for raw_name, raw_value in pairs:
@@ -36,6 +36,9 @@ def single_headers(pairs: list[tuple[bytes, bytes]], path: str) -> dict[str, str
         if name in headers and name in _ONCE:
             raise Refusal(400, f"the header {name} comes twice", path, f"one {name}", "send one")
         headers[name] = value
+    if "transfer-encoding" in headers and "content-length" in headers:
+        # a proxy in front may believe the other one, and see two requests where we see one
+        raise Refusal(400, "the body has two lengths", path, "Content-Length", "send one")
     return headers
 
 

@@ -49,18 +49,20 @@ async def large_app(scope, receive, send):
 class Server:
     def __init__(self, app, kind):
         self.app, self.kind = app, kind
-        self.clients = []
+        self.clients, self.made = [], 0
 
     async def __aenter__(self):
         config = Config(self.app, lifespan="off", log_config=None, timeout_keep_alive=60)
         config.load()
         self.state = ServerState()
         loop = asyncio.get_running_loop()
-        self.server = await loop.create_server(
-            lambda: self.kind(config=config, server_state=self.state, app_state={}), "127.0.0.1", 0
-        )
+        self.server = await loop.create_server(lambda: self.connection(config), "127.0.0.1", 0)
         self.address = self.server.sockets[0].getsockname()
         return self
+
+    def connection(self, config):
+        self.made += 1
+        return self.kind(config=config, server_state=self.state, app_state={})
 
     async def __aexit__(self, *_):
         self.server.close()
@@ -129,10 +131,9 @@ async def test_a_long_answer_is_not_cut_and_the_idle_connection_closed_after_it(
 @pytest.mark.parametrize("app", [endless_app, large_app])
 async def test_who_does_not_read_is_dropped_and_its_request_ends(app):
     async with Server(app, Hasty) as server:
-        link = unread(server.address)
-        await server.until(lambda: server.state.connections)
-        await server.gone()
-        link.close()
+        with unread(server.address):
+            await server.until(lambda: server.made)
+            await server.gone()
 
 
 async def test_who_reads_slowly_but_reads_is_not_dropped():
