@@ -14,7 +14,7 @@ from pathlib import Path
 import trustme
 from browser.scene import Peers, Scene, t2_compact, write_configuration
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parent.parent
 
 
 def free_port():
