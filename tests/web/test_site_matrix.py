@@ -141,3 +141,19 @@ async def test_a_websocket_is_closed_before_it_opens(tmp_path, path, origin):
 
     await world.app(scope | {"query_string": b"", "raw_path": path.encode()}, receive, send)
     assert sent == [{"type": "websocket.close", "code": 1008}]
+
+
+async def test_a_body_with_two_lengths_is_refused(tmp_path):
+    world = World(tmp_path)
+    headers = [
+        ("host", OWN),
+        ("authorization", f"Bearer {TOKENS['operator']}"),
+        ("content-type", "application/json"),
+        ("content-length", "2"),
+        ("transfer-encoding", "chunked"),
+    ]
+    answer = await ask_app(world.app, "POST", "/api/park", headers, body=b"{}")
+    assert answer.status == 400
+    assert world.asked == []
+    answer = await ask_app(world.app, "POST", "/api/park", headers[:-1], body=b"{}")
+    assert answer.status == 200
