@@ -9,6 +9,7 @@ from starlette.testclient import TestClient
 from motionserver.core.limits import machine_to_mapping
 from motionserver.settings.tuning_book import TuningBook
 from motionserver.web.app import build_app
+from motionserver.web.attempts import Attempts
 from motionserver.web.config import WebConfig
 
 MACHINE = t2_compact()
@@ -59,6 +60,7 @@ class World:
             Newest(self.scene.service),
             self.ask(self.scene.answer_guard),
             self.ask(lambda request: self.scene.answer_planner(request)),
+            Attempts(lambda: 0.0),
         )
 
     def now(self):

@@ -38,6 +38,7 @@ def build_app(
     service: SnapshotSource,
     ask_guard: Ask,
     ask_planner: Ask,
+    attempts: Attempts | None = None,
 ) -> FastAPI:
     """Put the application together; nothing is bound or started.
 
@@ -48,12 +49,13 @@ def build_app(
         service: Snapshots of the service that watches the processes.
         ask_guard: Sends a request to the guard.
         ask_planner: Sends a request to the planner.
+        attempts: Keeps who guesses tokens waiting; None = by the real clock.
 
     Raises:
         WebConfigError: The tokens file cannot be used.
     """
     app = FastAPI(title="motionserver", docs_url=None, redoc_url=None, openapi_url=None)
-    doorkeeper = Doorkeeper(load_tokens(config.tokens_file), Attempts())
+    doorkeeper = Doorkeeper(load_tokens(config.tokens_file), attempts or Attempts())
     board = StatusBoard(guard, planner, service, config)
     answered: Counter[str] = Counter()
     desk = Desk(
