@@ -22,6 +22,7 @@ from motionserver.telemetry.link import Maps
 from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.requests import RequestError, ask
 from motionserver.telemetry.ticker import now_ns
+from motionserver.web.config import config_from
 
 
 class NotRunningError(MotionServerError):
@@ -50,14 +51,22 @@ def serve(path: Path, dry_run: bool) -> int:
 def make_service(config: Config, run_dir: Path, dry_run: bool) -> Service:
     """The service of a configuration."""
     resolved = resolve(config, run_dir, dry_run)
+    _check_page(config, resolved)
     local = (config.platform.local_host, config.platform.local_port)
     return Service(resolved, config.web.enabled, local, run_dir)
+
+
+def _check_page(config: Config, resolved: dict[str, Any]) -> None:
+    """Say here what the page would refuse at every start, while nothing moves yet."""
+    if config.web.enabled:
+        config_from(resolved["web"]).check()
 
 
 def describe(path: Path) -> str:
     """What a configuration means, for people."""
     config = load_config(path)
     resolved = resolve(config, run_dir_of(config))
+    _check_page(config, resolved)
     machine = machine_from_mapping(resolved["machine"])
     platform, planner = resolved["platform"], resolved["planner"]
     stroke = (machine.leg_max - machine.leg_min) * 1e3

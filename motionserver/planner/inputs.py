@@ -15,7 +15,7 @@ from motionserver.planner.preview import PreviewInlet
 from motionserver.sources.base import SourceError, SourceFormat
 from motionserver.sources.registry import make_source
 from motionserver.sources.udp import UdpInput
-from motionserver.sources.zenoh_input import ZenohInput
+from motionserver.sources.zenoh_input import ZenohInput, link_of
 
 log = logging.getLogger("motionserver.planner")
 SHOWN_ERRORS = 5
@@ -79,9 +79,10 @@ def open_input(options: InputOptions) -> Input:
     """
     make_source(options.kind, options.key)
     if options.kind == "zenoh":
-        endpoint = f"tcp/{options.host}:{options.port}"
+        file = options.zenoh_config
+        endpoint = f"{link_of(file)}/{options.host}:{options.port}"
         transport = ZenohInput(
-            options.topic, [endpoint], list(options.connect), options.preview_topic
+            options.topic, [endpoint], list(options.connect), options.preview_topic, file
         )
         return Input(options, transport, drain_previews=transport.drain_previews)
     return Input(options, UdpInput(options.host, options.port))

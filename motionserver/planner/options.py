@@ -23,6 +23,7 @@ class InputOptions:
         topic: Zenoh key, for kind zenoh.
         connect: Zenoh endpoints to connect to, for kind zenoh.
         preview_topic: Zenoh key of previews that come apart from the cues; "" for none.
+        zenoh_config: Zenoh's own file with certificates, passwords and access list; "" for none.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class InputOptions:
     topic: str
     connect: tuple[str, ...]
     preview_topic: str = ""
+    zenoh_config: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,7 @@ def read_options(run_dir: Path) -> PlannerOptions:
             topic=source["topic"],
             connect=tuple(source["connect"]),
             preview_topic=source.get("preview_topic", ""),
+            zenoh_config=source.get("zenoh_config", ""),
         )
         for source in data["sources"]
     )

@@ -73,6 +73,7 @@ class SourceSection(Strict):
     key_file: str = ""
     topic: str = "motion/0/in/cue"
     preview_topic: str = ""
+    zenoh_config: str = ""
     connect: list[str] = Field(default_factory=list)
     allow_unsigned: bool = False
 
@@ -84,6 +85,8 @@ class SourceSection(Strict):
 
     @model_validator(mode="after")
     def _preview_by_zenoh(self) -> Self:
+        if self.zenoh_config and self.kind != "zenoh":
+            raise ValueError('zenoh_config needs kind = "zenoh"; other kinds are not encrypted')
         if self.preview_topic and self.kind != "zenoh":
             raise ValueError('preview_topic needs kind = "zenoh"; add a source of that kind')
         if self.preview_topic and self.preview_topic == self.topic:

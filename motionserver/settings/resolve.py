@@ -133,6 +133,11 @@ def _source(source: SourceSection) -> dict[str, Any]:
             "Give key_file, listen on 127.0.0.1, or say allow_unsigned = true on a network that "
             "nobody else can reach.",
         )
+    secure = str(Path(source.zenoh_config).expanduser()) if source.zenoh_config else ""
+    if secure and not Path(secure).is_file():
+        raise ConfigError(
+            f"{where}: zenoh_config", f"{secure}: no such file", "Give Zenoh's configuration."
+        )
     return {
         "kind": source.kind,
         "host": host,
@@ -141,6 +146,7 @@ def _source(source: SourceSection) -> dict[str, Any]:
         "topic": source.topic,
         "connect": source.connect,
         "preview_topic": source.preview_topic,
+        "zenoh_config": secure,
     }
 
 

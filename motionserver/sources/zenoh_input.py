@@ -12,7 +12,7 @@ import zenoh
 DEPTH: Final = 64
 
 
-def zenoh_config(listen: list[str], connect: list[str]) -> zenoh.Config:
+def zenoh_config(listen: list[str], connect: list[str], file: str = "") -> zenoh.Config:
     """A configuration that talks to named endpoints only.
 
     Zenoh's defaults listen on all interfaces, scout by multicast and accept messages of a
@@ -21,8 +21,13 @@ def zenoh_config(listen: list[str], connect: list[str]) -> zenoh.Config:
     Args:
         listen: Endpoints to listen on, such as tcp/127.0.0.1:7447.
         connect: Endpoints to connect to.
+        file: Zenoh's own file with certificates, passwords and access list; "" for none. What
+            stands there about endpoints, scouting and sizes does not count.
+
+    Raises:
+        zenoh.ZError: The file cannot be read.
     """
-    config = zenoh.Config()
+    config = zenoh.Config.from_file(file) if file else zenoh.Config()
     for key, value in (
         ("mode", "peer"),
         ("listen/endpoints", listen),
@@ -37,6 +42,21 @@ def zenoh_config(listen: list[str], connect: list[str]) -> zenoh.Config:
     return config
 
 
+def link_of(file: str) -> str:
+    """Kind of link to listen on: "tls" if ``file`` names a certificate, else "tcp".
+
+    Raises:
+        OSError: The file cannot be read.
+    """
+    if not file:
+        return "tcp"
+    try:
+        named = zenoh.Config.from_file(file).get_json("transport/link/tls/listen_certificate")
+    except zenoh.ZError as error:
+        raise OSError(f"zenoh_config {file}: {error}") from error
+    return "tcp" if json.loads(named) is None else "tls"
+
+
 class ZenohInput:
     """A subscriber whose callback only stores; the tick reads.
 
@@ -44,7 +64,12 @@ class ZenohInput:
     """
 
     def __init__(
-        self, topic: str, listen: list[str], connect: list[str], preview_topic: str = ""
+        self,
+        topic: str,
+        listen: list[str],
+        connect: list[str],
+        preview_topic: str = "",
+        file: str = "",
     ) -> None:
         """Open the session and subscribe.
 
@@ -53,6 +78,7 @@ class ZenohInput:
             listen: Endpoints to listen on.
             connect: Endpoints to connect to.
             preview_topic: Key on which previews are put, apart from the cues; "" for none.
+            file: Zenoh's own file with certificates, passwords and access list; "" for none.
 
         Raises:
             OSError: An endpoint or the key cannot be used.
@@ -61,7 +87,7 @@ class ZenohInput:
         self._previews: deque[tuple[bytes, str, int]] = deque(maxlen=DEPTH)
         self._topic = topic
         try:
-            self._session = zenoh.open(zenoh_config(listen, connect))
+            self._session = zenoh.open(zenoh_config(listen, connect, file))
             self._subscribers = [self._session.declare_subscriber(topic, self._take)]
             if preview_topic:
                 self._subscribers.append(

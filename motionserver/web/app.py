@@ -12,8 +12,9 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from motionserver.settings.tuning_presets import PresetShelf
+from motionserver.web.attempts import Attempts
 from motionserver.web.audit import Audit
-from motionserver.web.auth import Role, load_tokens
+from motionserver.web.auth import Doorkeeper
 from motionserver.web.config import WebConfig
 from motionserver.web.desk import Desk
 from motionserver.web.gate import Gate
@@ -23,6 +24,7 @@ from motionserver.web.requests import Ask, Peer, guard_refusal
 from motionserver.web.side_routes import side_routes
 from motionserver.web.snapshot import SnapshotSource, StatusBoard
 from motionserver.web.stream import Streams
+from motionserver.web.tokens import Role, load_tokens
 from motionserver.web.tuning_routes import tuning_routes
 
 _log = logging.getLogger(__name__)
@@ -36,6 +38,7 @@ def build_app(
     service: SnapshotSource,
     ask_guard: Ask,
     ask_planner: Ask,
+    attempts: Attempts | None = None,
 ) -> FastAPI:
     """Put the application together; nothing is bound or started.
 
@@ -46,16 +49,17 @@ def build_app(
         service: Snapshots of the service that watches the processes.
         ask_guard: Sends a request to the guard.
         ask_planner: Sends a request to the planner.
+        attempts: Keeps who guesses tokens waiting; None = by the real clock.
 
     Raises:
         WebConfigError: The tokens file cannot be used.
     """
     app = FastAPI(title="motionserver", docs_url=None, redoc_url=None, openapi_url=None)
+    doorkeeper = Doorkeeper(load_tokens(config.tokens_file), attempts or Attempts())
     board = StatusBoard(guard, planner, service, config)
     answered: Counter[str] = Counter()
     desk = Desk(
         config,
-        load_tokens(config.tokens_file),
         Peer("guard", ask_guard),
         Peer("planner", ask_planner),
         PresetShelf(config.presets_dir),
@@ -67,7 +71,7 @@ def build_app(
     app.include_router(side_routes(desk))
     app.mount("/static", StaticFiles(directory=_STATIC), name="static")
     _error_answers(app)
-    app.add_middleware(Gate, host_names=config.host_names, answered=answered)
+    app.add_middleware(Gate, host_names=config.host_names, doorkeeper=doorkeeper, answered=answered)
     return app
 
 
@@ -97,13 +101,13 @@ def _reading_routes(app: FastAPI, desk: Desk, board: StatusBoard, answered: Coun
 
     @app.get("/api/stream")
     async def stream(request: Request) -> Response:
-        desk.require(request, Role.VIEWER)
-        return streams.open(request.url.path)
+        caller = desk.require(request, Role.VIEWER)
+        return streams.open(request.url.path, caller.address)
 
 
 def _motion_routes(app: FastAPI, desk: Desk) -> None:
     async def pass_on(request: Request, op: str, role: Role) -> Response:
-        caller = desk.require(request, role, token=True)
+        caller = desk.require(request, role)
         path = request.url.path
         refusal = desk.config.engage_refusal() if op == "engage" else None
         if refusal is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import json
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -90,6 +91,11 @@ class WebConfig:
             path = getattr(self, name)
             if path is not None and not path.is_file():
                 raise WebConfigError(f"{name} = {path}: no such file")
+        if self.tls_key is not None and (mode := stat.S_IMODE(self.tls_key.stat().st_mode)) & 0o007:
+            raise WebConfigError(
+                f"tls_key = {self.tls_key}: mode {mode:04o} lets every user of this computer read "
+                f"it; do: chmod o-rwx {self.tls_key}"
+            )
         if self.is_loopback:
             return
         if self.tls_cert is None or not self.tokens_file.is_file():
@@ -110,6 +116,20 @@ def is_loopback(address: str) -> bool:
     return (mapped or ip).is_loopback
 
 
+def config_from(data: Mapping[str, Any]) -> WebConfig:
+    """The configuration from what the settings resolved it to.
+
+    Raises:
+        TypeError: A key is missing or unknown.
+    """
+    values = dict(data)
+    for name in ("tokens_file", "run_dir", "presets_dir", "tls_cert", "tls_key"):
+        if values.get(name) is not None:
+            values[name] = Path(values[name])
+    values["allowed_hosts"] = tuple(values.get("allowed_hosts", ()))
+    return WebConfig(**values)
+
+
 def read_config(path: Path) -> WebConfig:
     """Read the JSON file written by whoever starts this process.
 
@@ -117,11 +137,6 @@ def read_config(path: Path) -> WebConfig:
         WebConfigError: Not readable, or a key is missing or unknown.
     """
     try:
-        data = cast("dict[str, Any]", json.loads(path.read_text(encoding="utf-8")))
-        for name in ("tokens_file", "run_dir", "presets_dir", "tls_cert", "tls_key"):
-            if data.get(name) is not None:
-                data[name] = Path(data[name])
-        data["allowed_hosts"] = tuple(data.get("allowed_hosts", ()))
-        return WebConfig(**data)
+        return config_from(cast("dict[str, Any]", json.loads(path.read_text(encoding="utf-8"))))
     except (OSError, ValueError, TypeError, AttributeError) as error:
         raise WebConfigError(f"{path}: {error}") from error

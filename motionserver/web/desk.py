@@ -11,11 +11,12 @@ from fastapi import Request
 
 from motionserver.settings.tuning_presets import PresetShelf
 from motionserver.web.audit import Audit
-from motionserver.web.auth import Caller, Role, Tokens, forbidden, identify, unauthorised
+from motionserver.web.auth import Caller, forbidden, unauthorised
 from motionserver.web.config import WebConfig
 from motionserver.web.gate import MAX_BODY, too_large
 from motionserver.web.refusal import Refusal
 from motionserver.web.requests import Peer
+from motionserver.web.tokens import Role
 
 _PATIENCE: Final = 5.0
 """Time a body may take to arrive [s]."""
@@ -27,7 +28,6 @@ class Desk:
 
     Attributes:
         config: Of this process.
-        tokens: Known tokens.
         guard: Takes engage, park, reset.
         planner: Takes changes of the tuning.
         presets: Named tunings.
@@ -35,31 +35,26 @@ class Desk:
     """
 
     config: WebConfig
-    tokens: Tokens
     guard: Peer
     planner: Peer
     presets: PresetShelf
     audit: Audit
 
-    def require(self, request: Request, role: Role, *, token: bool = False) -> Caller:
-        """Let through who may do this.
+    def require(self, request: Request, role: Role) -> Caller:
+        """Let through who may do this; who it is was found out at the gate.
 
         Args:
             request: The request.
             role: Least role.
-            token: True if a token is needed even for the viewer's role.
 
         Raises:
-            Refusal: Stranger or wrong token (401), or a role that does not reach (403).
+            Refusal: A stranger (401), or a role that does not reach (403).
         """
-        path = request.url.path
-        address = request.client.host if request.client else ""
-        caller = identify(self.tokens, request.headers, address, path)
-        if caller is None or (not caller.token_id and (token or role > Role.VIEWER)):
-            raise unauthorised("a token is needed", path)
+        caller: Caller | None = getattr(request.state, "caller", None)
+        if caller is None:
+            raise unauthorised("a token is needed", request.url.path)
         if caller.role < role:
-            raise forbidden(caller.role, role, path)
-        request.state.caller = caller
+            raise forbidden(caller.role, role, request.url.path)
         return caller
 
 

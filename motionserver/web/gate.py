@@ -1,8 +1,7 @@
-"""What every request passes first: host, origin, kind and size of body; and the headers out."""
+"""What every request passes first: names, site, token, load, body; and the headers out."""
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping
 from typing import Final
@@ -10,12 +9,17 @@ from typing import Final
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from motionserver.web.auth import Doorkeeper
 from motionserver.web.refusal import Refusal
+from motionserver.web.site import READING, check_host, check_site, is_public, single_headers
 
 MAX_BODY: Final = 64 * 1024
 """Largest request body [B]."""
-_HOST: Final = re.compile(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:[0-9]{1,5})?")
-_READING: Final = frozenset({"GET", "HEAD"})
+MOST_AT_ONCE: Final = 64
+"""Requests that are answered at a time, streams among them."""
+PARK: Final = "/api/park"
+"""Parking finds room beyond that, and is judged whatever guesses came before it."""
+_ROOM_TO_PARK: Final = 16
 _SECURITY: Final = {
     "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'; object-src 'none'",
@@ -29,18 +33,28 @@ _SECURITY: Final = {
 
 
 class Gate:
-    """Refuses what no page of ours would send; a token in a header is asked for later.
+    """Refuses what no page of ours would send, and strangers; a route only asks for the role.
 
     Args:
         app: What lies behind.
         host_names: Names the server may be asked under, against DNS rebinding.
+        doorkeeper: Tells who asks.
         answered: Counts answers by status, for the metrics.
     """
 
-    def __init__(self, app: ASGIApp, *, host_names: frozenset[str], answered: Counter[str]) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        *,
+        host_names: frozenset[str],
+        doorkeeper: Doorkeeper,
+        answered: Counter[str],
+    ) -> None:
         self._app = app
         self._host_names = host_names
+        self._doorkeeper = doorkeeper
         self._answered = answered
+        self._open = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request and pass it on."""
@@ -61,61 +75,53 @@ class Gate:
                     headers["strict-transport-security"] = "max-age=31536000"
             await send(message)
 
+        self._open += 1
         try:
             self._check(scope)
+            await self._app(scope, receive, guarded_send)
         except Refusal as refusal:
             await refusal.response()(scope, receive, guarded_send)
-            return
-        await self._app(scope, receive, guarded_send)
+        finally:
+            self._open -= 1
 
     def _check(self, scope: Scope) -> None:
-        pairs = [(k.decode("latin-1"), v.decode("latin-1")) for k, v in scope["headers"]]
-        headers = dict(pairs)
-        path = str(scope["path"])
-        hosts = [value for name, value in pairs if name == "host"]
-        self._check_host(hosts, path)
-        _check_origin(headers, hosts[0].lower(), scope["method"], path)
-        _check_body(headers, scope["method"], path)
-
-    def _check_host(self, hosts: list[str], path: str) -> None:
-        match = _HOST.fullmatch(hosts[0].lower()) if len(hosts) == 1 else None
-        if match is None or match[1] not in self._host_names:
-            raise Refusal(
-                400,
-                "this server is not asked under that host name",
+        method, path = str(scope["method"]), str(scope["path"])
+        headers = single_headers(scope["headers"], path)
+        host = check_host(headers, self._host_names, path)
+        check_site(headers, host, scope["scheme"], method, path)
+        if not is_public(method, path):
+            client = scope.get("client")
+            caller = self._doorkeeper.admit(
+                headers,
+                client[0] if client else "",
                 path,
-                "Host: " + ", ".join(sorted(self._host_names)),
-                "use one of these names, or add the name to allowed_hosts",
+                must_hold=method not in READING,
+                is_urgent=path == PARK,
             )
+            scope.setdefault("state", {})["caller"] = caller
+        if self._open > MOST_AT_ONCE + (_ROOM_TO_PARK if path == PARK else 0):
+            raise _busy(path)
+        _check_body(headers, method, path)
 
 
-def _check_origin(headers: Mapping[str, str], host: str, method: str, path: str) -> None:
-    origin = headers.get("origin")
-    if origin is not None and origin.lower() not in (f"http://{host}", f"https://{host}"):
-        raise _foreign("Origin", path)
-    opened = method in _READING and not path.startswith(("/api/", "/metrics"))
-    site = headers.get("sec-fetch-site", "none")
-    if not opened and site not in ("same-origin", "none"):
-        raise _foreign("Sec-Fetch-Site", path)
-
-
-def _foreign(header: str, path: str) -> Refusal:
+def _busy(path: str) -> Refusal:
     return Refusal(
-        403,
-        f"{header} says that another site sent this",
+        503,
+        "too many requests at once",
         path,
-        "requests of this server's own page, or of a program that sends no such header",
-        "open the page under the server's own address",
+        f"{MOST_AT_ONCE} at a time",
+        "close other pages, wait a moment and repeat",
+        headers={"retry-after": "1"},
     )
 
 
 def _check_body(headers: Mapping[str, str], method: str, path: str) -> None:
     length = headers.get("content-length", "0")
-    if not length.isdigit() or int(length) > MAX_BODY:
+    if not (length.isascii() and length.isdigit() and len(length) < 16 and int(length) <= MAX_BODY):
         raise too_large(path)
-    has_body = length.strip("0") != "" or "transfer-encoding" in headers
+    has_body = int(length) > 0 or "transfer-encoding" in headers
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()
-    if method not in _READING and has_body and kind != "application/json":
+    if method not in READING and has_body and kind != "application/json":
         raise Refusal(
             415,
             "the body is not announced as JSON",

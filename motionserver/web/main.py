@@ -11,7 +11,7 @@ from fastapi import FastAPI
 
 from motionserver.telemetry.parent import follow_parent
 from motionserver.web.config import WebConfig, WebConfigError, read_config
-from motionserver.web.connection import PatientProtocol
+from motionserver.web.connection import PatientLoop, PatientProtocol
 from motionserver.web.wiring import wired_app
 
 _NICENESS = 10
@@ -29,14 +29,14 @@ def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
             http=PatientProtocol,
             ws="none",
             lifespan="off",
-            limit_concurrency=64,
+            loop=f"{PatientLoop.__module__}:{PatientLoop.__name__}",
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             h11_max_incomplete_event_size=16 * 1024,
             proxy_headers=False,
             server_header=False,
             access_log=False,
-            log_level="warning",
+            log_level="error",  # a stranger must not be able to fill the log,
         )
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final, Protocol
 
 from motionserver.web.refusal import Refusal
@@ -43,6 +44,8 @@ class Peer:
     def __init__(self, name: str, ask: Ask) -> None:
         self._name = name
         self._ask = ask
+        # its own threads: to park, nobody waits behind questions to a planner that hangs
+        self._threads = ThreadPoolExecutor(4, thread_name_prefix=f"ask-{name}")
 
     async def ask(self, request: dict[str, Any], path: str) -> dict[str, Any]:
         """Ask without holding up the other readers.
@@ -51,7 +54,8 @@ class Peer:
             Refusal: No answer (503).
         """
         try:
-            answer = await asyncio.to_thread(self._ask, request)
+            loop = asyncio.get_running_loop()
+            answer = await loop.run_in_executor(self._threads, self._ask, request)
         except (OSError, ValueError) as error:
             raise Refusal(
                 503,

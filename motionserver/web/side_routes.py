@@ -9,10 +9,11 @@ from starlette.responses import Response
 
 from motionserver.settings.fields import TuningError, algorithms
 from motionserver.settings.side_engines import side_names
-from motionserver.web.auth import Role
+from motionserver.web.described import takes_engines
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import tuning_refusal
+from motionserver.web.tokens import Role
 
 
 def side_routes(desk: Desk) -> APIRouter:
@@ -25,7 +26,7 @@ def side_routes(desk: Desk) -> APIRouter:
         answer = await desk.planner.ask({"op": "side"}, request.url.path)
         return _response(answer, request.url.path)
 
-    @router.post("/api/side")
+    @router.post("/api/side", openapi_extra=takes_engines())
     async def run_beside(request: Request) -> Response:
         caller = desk.require(request, Role.OPERATOR)
         path = request.url.path

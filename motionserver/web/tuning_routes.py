@@ -11,10 +11,11 @@ from starlette.responses import Response
 from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes, default_for, describe
 from motionserver.settings.tuning_presets import Preset
-from motionserver.web.auth import Role
+from motionserver.web.described import takes_tunables, versioned
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import tuning_refusal
+from motionserver.web.tokens import Role
 
 _TAG: Final = re.compile(r'"([0-9]{1,15})"')
 
@@ -31,7 +32,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
         answer = await desk.planner.ask({"op": "tuning"}, request.url.path)
         return _tuning_response(answer, request, fields=fields)
 
-    @router.patch("/api/tuning")
+    @router.patch("/api/tuning", openapi_extra=versioned(takes_tunables(needed=True)))
     async def tune(request: Request) -> Response:
         caller = desk.require(request, Role.TUNER)
         version = _if_match(request)
@@ -42,7 +43,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
         desk.audit.note("tune", caller, _result(answer), version=version, changes=changes)
         return _tuning_response(answer, request)
 
-    @router.post("/api/tuning/undo")
+    @router.post("/api/tuning/undo", openapi_extra=versioned())
     async def undo(request: Request) -> Response:
         caller = desk.require(request, Role.TUNER)
         version = _if_match(request)
@@ -72,7 +73,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
             raise _invalid(error, request.url.path) from error
         return json_response(_summary(found) | {"values": found.values})
 
-    @router.put("/api/presets/{name}")
+    @router.put("/api/presets/{name}", openapi_extra=takes_tunables(needed=False))
     async def save(request: Request, name: str) -> Response:
         caller = desk.require(request, Role.TUNER)
         values = await read_json(request, empty={})

@@ -1,6 +1,8 @@
 import asyncio
 import hashlib
+import hmac
 import json
+import os
 import re
 import stat
 import tomllib
@@ -10,12 +12,13 @@ import pytest
 from browser.scene import t2_compact, write_configuration
 
 from motionserver.web.audit import Audit
-from motionserver.web.auth import Caller, Role, load_tokens
+from motionserver.web.auth import Caller
 from motionserver.web.config import WebConfig, WebConfigError, read_config
 from motionserver.web.main import main
 from motionserver.web.refusal import Refusal
 from motionserver.web.snapshot import StatusBoard
-from motionserver.web.stream import MOST_READERS, Streams
+from motionserver.web.stream import MOST_OF_ONE, MOST_READERS, Streams
+from motionserver.web.tokens import Role, Tokens, load_tokens
 
 STATIC = files("motionserver.web").joinpath("static")
 
@@ -65,20 +68,45 @@ def test_an_unreadable_snapshot_is_as_good_as_none(tmp_path):
     assert board.current().data["state"] == "UNKNOWN"
 
 
-async def test_streams_are_bounded_and_counted(tmp_path):
-    streams = Streams(StatusBoard(Counted(), Counted(), Counted(), config(tmp_path), Clock()))
-    bodies = [streams.open("/api/stream").body_iterator for _ in range(MOST_READERS)]
-    for body in bodies:
-        assert await anext(body) == b"retry: 1000\n\n"
-    event = await anext(bodies[0])
-    assert json.loads(event.removeprefix(b"data: "))["state"] == "UNKNOWN"
-    with pytest.raises(Refusal) as caught:
-        streams.open("/api/stream")
-    assert caught.value.status == 503
-    for body in bodies:
-        await body.aclose()
-    assert streams.readers == 0
+async def nothing(*_):
     await asyncio.sleep(0)
+    return {"type": "http.disconnect"}
+
+
+async def test_streams_are_bounded_and_counted_before_they_begin(tmp_path):
+    streams = Streams(StatusBoard(Counted(), Counted(), Counted(), config(tmp_path), Clock()))
+    places = ["a"] * MOST_OF_ONE + ["b"] * (MOST_READERS - MOST_OF_ONE)
+    opened = [streams.open("/api/stream", place) for place in places]
+    assert streams.readers == MOST_READERS
+    for place in "abc":
+        with pytest.raises(Refusal) as caught:
+            streams.open("/api/stream", place)
+        assert caught.value.status == 503
+    body = opened[0].body_iterator
+    assert await anext(body) == b"retry: 1000\n\n"
+    event = await anext(body)
+    assert json.loads(event.removeprefix(b"data: "))["state"] == "UNKNOWN"
+    await body.aclose()
+    for stream in opened[1:]:
+        await stream({"type": "http", "asgi": {"spec_version": "2.3"}}, nothing, nothing)
+    assert streams.readers == 1
+    with pytest.raises(RuntimeError):
+        await opened[0]({"type": "http", "asgi": {"spec_version": "2.3"}}, nothing, broken)
+    assert streams.readers == 0
+
+
+async def broken(*_):
+    raise RuntimeError("the connection went")
+
+
+async def test_one_address_cannot_take_all_streams(tmp_path):
+    streams = Streams(StatusBoard(Counted(), Counted(), Counted(), config(tmp_path), Clock()))
+    opened = [streams.open("/api/stream", "a") for _ in range(MOST_OF_ONE)]
+    with pytest.raises(Refusal):
+        streams.open("/api/stream", "a")
+    opened.append(streams.open("/api/stream", "b"))
+    for stream in opened:
+        await stream({"type": "http", "asgi": {"spec_version": "2.3"}}, nothing, nothing)
 
 
 def test_tokens_are_made_once_private_and_different(tmp_path):
@@ -103,6 +131,11 @@ def test_tokens_are_made_once_private_and_different(tmp_path):
         ('{"viewer": "a", "tuner": "b", "operator": "c"}', 0o600),
         (json.dumps(dict.fromkeys(("viewer", "tuner", "operator"), "x" * 40)), 0o600),
         ("{}", 0o600),
+        (
+            json.dumps({"viewer": "v" * 40, "tuner": "t" * 40, "operator": "sha256:" + "0" * 63}),
+            0o600,
+        ),
+        ("[" * 4000, 0o600),
         ("nonsense", 0o600),
         (json.dumps({"viewer": "v" * 40, "tuner": "t" * 40, "operator": "o" * 40}), 0o640),
     ],
@@ -111,13 +144,14 @@ def test_unsafe_token_files_are_refused(tmp_path, text, mode):
     path = tmp_path / "tokens.json"
     path.write_text(text)
     path.chmod(mode)
-    with pytest.raises(WebConfigError):
+    with pytest.raises(WebConfigError) as caught:
         load_tokens(path)
+    assert text not in str(caught.value)
 
 
 def test_open_binds_need_certificate_key_and_tokens(tmp_path):
     pem = tmp_path / "x.pem"
-    pem.touch()
+    pem.touch(0o640)
     config(tmp_path).check()
     config(tmp_path, host="::1").check()
     for host in ("0.0.0.0", "::", "192.0.2.4", "simulator.example"):
@@ -129,6 +163,43 @@ def test_open_binds_need_certificate_key_and_tokens(tmp_path):
     config(tmp_path, host="192.0.2.4", tls_cert=pem, tls_key=pem).check()
     with pytest.raises(WebConfigError):
         config(tmp_path, tls_cert=pem).check()
+    pem.chmod(0o644)
+    with pytest.raises(WebConfigError, match="chmod o-rwx"):
+        config(tmp_path, tls_cert=pem, tls_key=pem).check()
+
+
+def test_tokens_may_be_kept_as_hashes(tmp_path):
+    path = tmp_path / "tokens.json"
+    plain = {role: role.name.lower() * 9 for role in Role}
+    hashed = {role: "sha256:" + hashlib.sha256(t.encode()).hexdigest() for role, t in plain.items()}
+    path.write_text(json.dumps({role.name.lower(): hashed[role] for role in Role}))
+    path.chmod(0o400)
+    tokens = load_tokens(path)
+    for role in Role:
+        assert tokens.role_of(plain[role]) == (role, hashed[role][7:15])
+        assert tokens.role_of(hashed[role]) is None
+
+
+def test_each_token_is_compared_whatever_was_found(monkeypatch):
+    compared = []
+    real = hmac.compare_digest
+    monkeypatch.setattr(hmac, "compare_digest", lambda a, b: compared.append((a, b)) or real(a, b))
+    tokens = Tokens({role: hashlib.sha256(role.name.encode()).digest() for role in Role})
+    for given in ("VIEWER", "TUNER", "OPERATOR", "nobody", ""):
+        compared.clear()
+        tokens.role_of(given)
+        assert len(compared) == len(Role)
+        assert {len(a) for pair in compared for a in pair} == {32}
+
+
+def test_a_tokens_file_of_somebody_else_is_refused(tmp_path, monkeypatch):
+    load_tokens(tmp_path / "t.json")
+    monkeypatch.setattr(os, "getuid", lambda: 4711)
+    if (tmp_path / "t.json").stat().st_uid == 0:  # root may change every file anyway
+        load_tokens(tmp_path / "t.json")
+        os.chown(tmp_path / "t.json", 4712, -1)
+    with pytest.raises(WebConfigError, match="chown 4711"):
+        load_tokens(tmp_path / "t.json")
 
 
 def test_only_loopback_answers_to_loopback_names(tmp_path):
