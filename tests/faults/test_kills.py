@@ -144,6 +144,12 @@ def test_a_guard_killed_while_the_server_ends_has_a_successor_that_parks(tmp_pat
 ROUNDS = 20
 
 
+def is_loaded(pid: int | None) -> bool:
+    """Whether a spare is through with its imports: the kernel lists it as waiting for the lock."""
+    waiting = [line for line in Path("/proc/locks").read_text("ascii").splitlines() if "->" in line]
+    return any(line.split()[5] == str(pid) for line in waiting)
+
+
 def campaign(rig: Rig, name: str, seed: int) -> list[dict[str, Any]]:
     """Kill it again and again at random moments; only a planner's death parks the platform."""
     random, figures = Random(seed), []
@@ -153,6 +159,7 @@ def campaign(rig: Rig, name: str, seed: int) -> list[dict[str, Any]]:
             rig.engage()
             rig.wait_state("RUN")
         rig.wait_for(rig.is_moving, "motion")
+        rig.wait_for(lambda: is_loaded(rig.pid("spare")), "the spare to be loaded")
         # a guard that took over just before does not pass its state on
         time.sleep(random.uniform(1.5, 4.0))
         speed = max(map(abs, rig.shown()["leg_speed"]))
