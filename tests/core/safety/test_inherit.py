@@ -132,6 +132,16 @@ def test_the_single_edge_of_auto_stays_used():
     assert not any(s.order is Order.RAISE for s in b.sent[-150:])
 
 
+def test_without_an_answer_of_the_device_the_next_one_will_do():
+    b = in_state("RUN")
+    will = replace(written(b), feedback=None)
+    b.guard = Guard(b.config)
+    assert inherit(b.guard, will, b.now)
+    b.run(1.0)
+    assert b.state == "RUN"
+    legal(b)
+
+
 def test_plans_that_are_not_allowed_are_not_played():
     b = in_state("RUN")
     will = written(b)
