@@ -47,14 +47,27 @@ def leg_directions(machine: Machine, poses: Array) -> LegDirections:
 
 def leg_lengths(machine: Machine, poses: Array) -> Array:
     """Pin-to-pin leg lengths for poses (N, 6) or one pose (6,): (N, 6) or (6,) [m]."""
-    batch = np.atleast_2d(poses)
-    # one plain matrix product for all poses: (N 3, 3) x (3, 6), legs along the last axis
-    turned = rotation(batch[:, 3:]).reshape(-1, 3) @ machine.platform_joints.T
-    legs = turned.reshape(-1, 3, 6)
-    legs += batch[:, :3, None]
+    # coordinates first, poses last: every operation runs along contiguous memory
+    batch = np.ascontiguousarray(np.atleast_2d(poses).T)
+    legs = np.matmul(machine.platform_joints, _rotation_rows(batch[3:]))
+    legs += batch[:3, None]
     legs -= _base_from_reference(machine)
-    lengths: Array = np.sqrt(np.einsum("nij,nij->nj", legs, legs))
+    legs *= legs
+    lengths: Array = np.sqrt(legs[0] + legs[1] + legs[2]).T
     return lengths if poses.ndim == 2 else lengths[0]
+
+
+def _rotation_rows(angles: Array) -> Array:
+    """`rotation` of angles (3, N), as rows of matrices over the poses, (3, 3, N)."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
+    across, along = sp * sr, sp * cr
+    return np.array(
+        (
+            (cy * cp, cy * across - sy * cr, cy * along + sy * sr),
+            (sy * cp, sy * across + cy * cr, sy * along - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
 
 
 def jacobian(machine: Machine, poses: Array) -> Array:
@@ -187,8 +200,9 @@ def _platform_radius(machine: Machine) -> float:
 
 @lru_cache(maxsize=16)
 def _base_from_reference(machine: Machine) -> Array:
-    """Base joints as seen from the reference point at neutral, (3, 6) [m]."""
-    return frozen(machine.base_joints.T - np.array([[0.0], [0.0], [machine.neutral_height]]))
+    """Base joints as seen from the reference point at neutral, (3, 6, 1) [m]."""
+    seen = machine.base_joints.T - np.array([[0.0], [0.0], [machine.neutral_height]])
+    return frozen(seen[..., None])
 
 
 @lru_cache(maxsize=16)
