@@ -21,7 +21,7 @@ REQUIRED: Final = {
     "pydantic": "2.10",
     "pydantic-settings": "2.7",
     "fastapi": "0.135",
-    "uvicorn": "0.34",
+    "uvicorn": "0.36",
     "typer": "0.15",
     "prometheus-client": "0.21",
     "tomli-w": "1.1",

@@ -75,7 +75,7 @@ def test_commands_of_an_operator(tmp_path: Path, cli: Cli) -> None:
         assert shown.returncode == 0
         assert re.search(rf"^state +({STATES})", shown.stdout)
         parts = json.loads(cli("status", config, "--json").stdout)
-        assert set(parts) == {"guard", "planner", "processes"}
+        assert set(parts) == {"guard", "planner", "processes", "blackbox"}
 
         # the device's own trouble is a fault that stays until somebody resets it
         rig.base.do(lambda emulator: MoogDevice.press_estop(emulator.device))

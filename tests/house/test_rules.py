@@ -40,6 +40,8 @@ def test_there_is_something_to_look_at():
 
 def test_imports_point_one_way(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
+    # its way of logging would silence every logger of ours in the tests that follow
+    monkeypatch.setattr("logging.config.dictConfig", lambda config: None)
     for folder in (".", "protocol", "clients"):
         monkeypatch.syspath_prepend(str(ROOT / folder))
     assert len(read_configuration("pyproject.toml")["contracts_options"]) >= 6
