@@ -69,7 +69,8 @@ def test_commands_of_an_operator(tmp_path: Path, cli: Cli) -> None:
         assert (reset.returncode, "nothing to reset" in reset.stdout) == (1, True)
         rig.drive()
         rig.wait_for(lambda: rig.shown()["source"]["fresh"], "a fresh source")
-        assert cli("engage", config).returncode == 0
+        # a base that stood still for a moment is offline for a moment
+        rig.wait_for(lambda: cli("engage", config).returncode == 0, "engaging to be granted")
         rig.wait_state("RUN")
         shown = cli("status", config)
         assert shown.returncode == 0
