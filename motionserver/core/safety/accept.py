@@ -15,7 +15,6 @@ from motionserver.core.safety.verify import (
     CLOSEST,
     GUARD_MARGINS,
     LONGEST_MOVE,
-    Margins,
     check_legs,
     check_ways_home,
     judge,
@@ -72,22 +71,16 @@ def accept_rest(
     """
     neutral = np.zeros(6)
     allowed = straight_way(machine, pose, neutral)
-    rejection: Rejection | None = Rejection(Reason.LEG_LENGTH)
+    verdict: AcceptedPlan | Rejection = Rejection(Reason.LEG_LENGTH)
     for share in (0.0, 0.005, 0.01, 0.02, 0.05):
         candidate = pose * (1.0 - share)
         drawn = share * float(np.max(np.abs(allowed.legs[0] - allowed.legs[-1])))
         if drawn > reach:
             break
-        plan = rest_at(candidate, plan_id)
-        rejection = (
-            well_formed(plan, LONGEST_MOVE)
-            or check_legs(machine, plan, plan, None, GUARD_MARGINS)
-            or check_ways_home(machine, candidate, homes, GUARD_MARGINS)
-        )
-        if rejection is None:
-            return AcceptedPlan(plan, None, _home_bound(machine, candidate, homes))
-    assert rejection is not None
-    return rejection
+        verdict = _checked(machine, rest_at(candidate, plan_id), None, None, homes)
+        if isinstance(verdict, AcceptedPlan):
+            break
+    return verdict
 
 
 def accept_move(
@@ -112,14 +105,7 @@ def accept_move(
     plan = rest_to_rest(plan_id, parent.plan.plan_id, takeover, start, goal, duration)
     if takeover < parent.plan.duration:
         return Rejection(Reason.NOT_AT_REST, None, None, takeover, parent.plan.duration)
-    rejection = (
-        well_formed(plan, LONGEST_MOVE)
-        or check_legs(machine, plan, parent.plan, parent.before, Margins())
-        or check_ways_home(machine, goal, homes, GUARD_MARGINS)
-    )
-    if rejection is not None:
-        return rejection
-    return AcceptedPlan(plan, parent.plan, _home_bound(machine, goal, homes))
+    return _checked(machine, plan, parent.plan, parent.before, homes)
 
 
 def accept_again(
@@ -136,17 +122,29 @@ def accept_again(
     Returns:
         The accepted plan, or why not.
     """
-    rejection = well_formed(plan, LONGEST_MOVE)
-    if rejection is None and before is not None:
-        rejection = well_formed(before, LONGEST_MOVE) or continues(plan, before)
+    if before is not None:
+        rejection = (
+            well_formed(plan, LONGEST_MOVE)
+            or well_formed(before, LONGEST_MOVE)
+            or continues(plan, before)
+        )
+        if rejection is not None:
+            return rejection
+    return _checked(machine, plan, before, None, homes)
+
+
+def _checked(
+    machine: Machine, plan: Plan, parent: Plan | None, before: Plan | None, homes: Array
+) -> AcceptedPlan | Rejection:
+    """Accept a plan of the guard's own; ``before`` is what its parent took over from, if known."""
     rejection = (
-        rejection
-        or check_legs(machine, plan, before or plan, None, GUARD_MARGINS)
+        well_formed(plan, LONGEST_MOVE)
+        or check_legs(machine, plan, parent or plan, before, GUARD_MARGINS)
         or check_ways_home(machine, plan.rest_pose, homes, GUARD_MARGINS)
     )
     if rejection is not None:
         return rejection
-    return AcceptedPlan(plan, before, _home_bound(machine, plan.rest_pose, homes))
+    return AcceptedPlan(plan, parent, _home_bound(machine, plan.rest_pose, homes))
 
 
 def _home_bound(machine: Machine, rest: Array, homes: Array) -> float:

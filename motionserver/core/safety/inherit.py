@@ -13,7 +13,7 @@ from motionserver.core.safety.accept import accept_again
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.states import State
 from motionserver.core.safety.verdict import AcceptedPlan, Rejection
-from motionserver.core.safety.watchdog import SECOND
+from motionserver.core.safety.watchdog import SECOND, measured_legs
 from motionserver.core.safety.will import Will
 
 LONGEST_GAP: Final = 0.1
@@ -70,15 +70,17 @@ def _astray(guard: Guard, will: Will, playback: Playback) -> str:
     """Why the raised platform cannot be where the plan's clock says; empty if it can."""
     if will.feedback is None or will.feedback.phase is not Phase.UP:
         return ""
-    device, state = guard.supervisor.device, state_now(playback)
-    device.answered(will.feedback)
+    state = state_now(playback)
     legs, speeds, _ = leg_motion(
         guard.machine, state.pose[None], state.velocity[None], state.acceleration[None]
     )
-    measured = device.legs()
-    if measured is None or bool((np.abs(measured - legs[0]) <= device.allowed(speeds[0])).all()):
+    measured = measured_legs(guard.machine, will.feedback)
+    if measured is None:
         return ""
-    return f"the platform is {1e3 * np.abs(measured - legs[0]).max():.0f} mm from its plan"
+    gap = np.abs(measured - legs[0])
+    if bool((gap <= guard.supervisor.device.allowed(speeds[0])).all()):
+        return ""
+    return f"the platform is {1e3 * gap.max():.0f} mm from its plan"
 
 
 def _played(guard: Guard, will: Will) -> Playback | Rejection:

@@ -156,11 +156,7 @@ class DeviceWatch:
 
     def legs(self) -> Array | None:
         """Measured pin-to-pin lengths, (6,) [m]; None if unknown."""
-        if self.newest is None:
-            return None
-        if self.newest.legs is not None:
-            return self.newest.legs
-        return None if self.newest.pose is None else leg_lengths(self._machine, self.newest.pose)
+        return None if self.newest is None else measured_legs(self._machine, self.newest)
 
     def track(self, now_ns: int, legs: Array, speeds: Array) -> bool:
         """Compare with what was commanded.
@@ -194,3 +190,10 @@ class DeviceWatch:
         """Start tracking anew: the platform is about to be told something else."""
         self._astray_since = None
         self.error = 0.0
+
+
+def measured_legs(machine: Machine, feedback: Feedback) -> Array | None:
+    """Pin-to-pin lengths that an answer tells, (6,) [m]; None if it tells neither legs nor pose."""
+    if feedback.legs is not None:
+        return feedback.legs
+    return None if feedback.pose is None else leg_lengths(machine, feedback.pose)

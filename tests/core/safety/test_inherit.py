@@ -142,6 +142,16 @@ def test_without_an_answer_of_the_device_the_next_one_will_do():
     legal(b)
 
 
+def test_a_base_that_measures_nothing_is_believed_to_follow():
+    b = in_state("RUN")
+    b.device.mute = True
+    b.run(0.1)
+    assert die(b)
+    b.run(0.5)
+    assert b.state == "RUN"
+    legal(b)
+
+
 def test_plans_that_are_not_allowed_are_not_played():
     b = in_state("RUN")
     will = written(b)
