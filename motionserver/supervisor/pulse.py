@@ -18,11 +18,15 @@ _LATE: Final = 2.5
 
 
 class Pulse:
-    """Judges one guard by the instant it writes at every send."""
+    """Judges one guard by the instant it writes at every send.
+
+    Attributes:
+        written_ns: What it had written at the look before [ns].
+    """
 
     def __init__(self) -> None:
         self._pid: int | None = None
-        self._written = 0
+        self.written_ns = 0
         self._looked = 0.0
         self._stood = 0.0
 
@@ -39,8 +43,8 @@ class Pulse:
             True if it is frozen; then it is watched anew.
         """
         elapsed, self._looked = now - self._looked, now
-        if pid is None or pid != self._pid or written_ns != self._written or not written_ns:
-            self._pid, self._written, self._stood = pid, written_ns, 0.0
+        if pid is None or pid != self._pid or written_ns != self.written_ns or not written_ns:
+            self._pid, self.written_ns, self._stood = pid, written_ns, 0.0
             return False
         if elapsed > _LATE * POLL:
             return False

@@ -223,14 +223,16 @@ class Service:
 
     async def _feel_pulse(self) -> None:
         """Kill a guard that stands still, so that the spare gets the lock."""
-        pulse, loop = Pulse(), asyncio.get_running_loop()
+        pulse, loop, active = Pulse(), asyncio.get_running_loop(), self.active_guard
         while True:
-            active, _ = self._active()
             message = self._maps.clock.read()
             written = 0 if message is None else GuardClock.unpack(message[1]).written_ns
-            pid = active.pid
-            runnable = pid is not None and is_runnable(pid)
-            if pulse.look(loop.time(), pid, written, runnable):
+            # who it is and what it waits for matters only once its clock stands
+            runnable = False
+            if written == pulse.written_ns:
+                active = self.active_guard
+                runnable = active.pid is not None and is_runnable(active.pid)
+            if pulse.look(loop.time(), active.pid, written, runnable):
                 log.error("%s stands still; killed, the spare takes over", active.name)
                 active.signal(signal.SIGKILL)
             await asyncio.sleep(POLL)
