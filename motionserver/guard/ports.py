@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from motionserver.core.device import Feedback
-from motionserver.core.plan import Plan, pack, unpack
+from motionserver.core.plan import Plan, unpack
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.watchdog import CueStatus
@@ -106,7 +106,7 @@ class Ports:
         playback = record.playback
         newest = None if playback is None else playback.newest.plan
         if newest is not None and newest.plan_id != self._accepted_id:
-            packed = pack(newest)
+            packed = self._writer.plan(newest)
             self._maps.accepted.write(packed)
             self._keep(packed)
             self._accepted_id = newest.plan_id

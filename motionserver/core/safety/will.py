@@ -85,18 +85,25 @@ class WillWriter:
     """Packs wills; a plan is packed once for all the packets it lives."""
 
     def __init__(self) -> None:
-        self._packed: dict[int, bytes] = {}
+        self._known: list[tuple[Plan, bytes]] = []
+
+    def plan(self, plan: Plan) -> bytes:
+        """A plan as bytes. Known again by itself: another planner may give its number again."""
+        for known, packed in self._known:
+            if known is plan:
+                return packed
+        packed = pack(plan)
+        self._known.append((plan, packed))
+        return packed
 
     def pack(self, will: Will) -> bytes:
-        """As bytes, for a mapped file."""
+        """As bytes, for a mapped file; plans that are not in it are forgotten."""
         plans = will.plans if will.before is None else (will.before, *will.plans)
-        self._packed = {
-            plan.plan_id: self._packed.get(plan.plan_id) or pack(plan) for plan in plans
-        }
+        self._known = [(plan, self.plan(plan)) for plan in plans]
         head = {name: getattr(will, name) for name in _PLAIN}
         head["has_before"] = will.before is not None
         head["feedback"] = None if will.feedback is None else _plain(will.feedback)
-        parts = [json.dumps(head).encode(), *(self._packed[plan.plan_id] for plan in plans)]
+        parts = [json.dumps(head).encode(), *(packed for _, packed in self._known)]
         return b"".join(_LENGTH.pack(len(part)) + part for part in parts)
 
 

@@ -152,6 +152,18 @@ def test_a_base_that_measures_nothing_is_believed_to_follow():
     legal(b)
 
 
+def test_a_plan_with_the_number_of_another_is_written_as_it_is():
+    b = in_state("RUN")
+    newest = b.guard.supervisor.device.newest
+    will, writer = will_of(b.record, newest, 0, b.now), WillWriter()
+    plan = will.plans[-1]
+    other = replace(plan, pose=frozen(plan.pose + 0.001))
+    assert writer.plan(plan) is writer.plan(plan)
+    writer.pack(will)
+    written_now = unpack_will(writer.pack(replace(will, plans=(*will.plans[:-1], other))))
+    assert np.array_equal(written_now.plans[-1].pose, other.pose)
+
+
 def test_plans_that_are_not_allowed_are_not_played():
     b = in_state("RUN")
     will = written(b)
