@@ -12,6 +12,7 @@ from motionserver.core.kinematics.rotation import (
     euler_rate_matrix,
     euler_rate_matrix_dot,
     rotation,
+    rotation_rows,
 )
 from motionserver.core.limits import Machine
 
@@ -49,25 +50,12 @@ def leg_lengths(machine: Machine, poses: Array) -> Array:
     """Pin-to-pin leg lengths for poses (N, 6) or one pose (6,): (N, 6) or (6,) [m]."""
     # coordinates first, poses last: every operation runs along contiguous memory
     batch = np.ascontiguousarray(np.atleast_2d(poses).T)
-    legs = np.matmul(machine.platform_joints, _rotation_rows(batch[3:]))
+    legs = np.matmul(machine.platform_joints, rotation_rows(batch[3:]))
     legs += batch[:3, None]
     legs -= _base_from_reference(machine)
     legs *= legs
     lengths: Array = np.sqrt(legs[0] + legs[1] + legs[2]).T
     return lengths if poses.ndim == 2 else lengths[0]
-
-
-def _rotation_rows(angles: Array) -> Array:
-    """`rotation` of angles (3, N), as rows of matrices over the poses, (3, 3, N)."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
-    across, along = sp * sr, sp * cr
-    return np.array(
-        (
-            (cy * cp, cy * across - sy * cr, cy * along + sy * sr),
-            (sy * cp, sy * across + cy * cr, sy * along - cy * sr),
-            (-sp, cp * sr, cp * cr),
-        )
-    )
 
 
 def jacobian(machine: Machine, poses: Array) -> Array:

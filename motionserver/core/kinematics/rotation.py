@@ -16,20 +16,28 @@ def rotation(angles: Array) -> Array:
     Returns:
         R = Rz(yaw) Ry(pitch) Rx(roll), (..., 3, 3).
     """
-    sine, cosine = np.sin(angles), np.cos(angles)
-    sr, sp, sy = sine[..., 0], sine[..., 1], sine[..., 2]
-    cr, cp, cy = cosine[..., 0], cosine[..., 1], cosine[..., 2]
-    out = np.empty((*angles.shape[:-1], 3, 3))
-    out[..., 0, 0] = cy * cp
-    out[..., 0, 1] = cy * sp * sr - sy * cr
-    out[..., 0, 2] = cy * sp * cr + sy * sr
-    out[..., 1, 0] = sy * cp
-    out[..., 1, 1] = sy * sp * sr + cy * cr
-    out[..., 1, 2] = sy * sp * cr - cy * sr
-    out[..., 2, 0] = -sp
-    out[..., 2, 1] = cp * sr
-    out[..., 2, 2] = cp * cr
-    return out
+    # rotation_rows has poses last; here they come first, whatever their shape
+    return np.ascontiguousarray(rotation_rows(angles.T).T.swapaxes(-1, -2))
+
+
+def rotation_rows(angles: Array) -> Array:
+    """`rotation` with the poses last, so that its products run along contiguous memory.
+
+    Args:
+        angles: Roll, pitch, yaw, (3, ...) [rad].
+
+    Returns:
+        R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3, ...).
+    """
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
+    across, along = sp * sr, sp * cr
+    return np.array(
+        (
+            (cy * cp, cy * across - sy * cr, cy * along + sy * sr),
+            (sy * cp, sy * across + cy * cr, sy * along - cy * sr),
+            (-sp, cp * sr, cp * cr),
+        )
+    )
 
 
 def euler_rate_matrix(angles: Array) -> Array:
