@@ -1,7 +1,6 @@
 """The page in a real browser, against the real server process, over the real request sockets."""
 
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -11,25 +10,12 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+from browser.chromium import IN_CHROMIUM
 from browser.scene import TOKENS, Peers, Scene, t2_compact, write_configuration
 
-CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 ROOT = Path(__file__).parents[2]
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no chromium at /usr/bin/chromium"),
-]
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu", "--disable-quic"]
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield browser
-        browser.close()
+pytestmark = IN_CHROMIUM
 
 
 class Site:

@@ -1,19 +1,13 @@
 """The page in a real browser over TLS, and another site's page that tries to move the platform."""
 
 import http.server
-import shutil
 import threading
-from pathlib import Path
 
-import pytest
+from browser.chromium import IN_CHROMIUM
 from browser.scene import TOKENS
 from web_process import Process, free_port, make_certificate
 
-CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(not Path(CHROMIUM).exists(), reason="no chromium at /usr/bin/chromium"),
-]
+pytestmark = IN_CHROMIUM
 ATTACK = """
 async ([target, token]) => {
   const found = {};
@@ -39,16 +33,6 @@ async ([target, token]) => {
   return found;
 }
 """
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        arguments = ["--no-sandbox", "--disable-gpu", "--disable-quic"]
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
-        yield browser
-        browser.close()
 
 
 def test_the_page_works_over_tls(chromium, tmp_path):

@@ -7,47 +7,26 @@ import pty
 import signal
 import socket
 import subprocess
-import sys
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from in_process import Cli, typed
 from motion_clients.delay_line import WayCounts
 from motion_clients.fault_proxy import seed_of
 from motion_clients.flawed_link import FlawedLink, LinkFlaws
 from rig import PATIENCE, command, environment, free_port, until
 
-from motionserver.cli import main
 from motionserver.cli.chaos_options import ChaosOptions
 from motionserver.cli.chaos_run import second_text, summary_text
 
-Cli = Callable[..., "Ended"]
 ENDS = ("--listen", "127.0.0.1:0", "--to", "127.0.0.1:9")
-
-
-@dataclass(frozen=True)
-class Ended:
-    returncode: int
-    stdout: str
-    stderr: str
 
 
 @pytest.fixture
 def chaos(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Cli:
     """The command in this process."""
-
-    def run(*arguments: str) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["motionserver", "chaos", *arguments])
-        capsys.readouterr()
-        status = 0
-        try:
-            main()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        return Ended(status, *capsys.readouterr())
-
-    return run
+    return typed(capsys, monkeypatch, "chaos")
 
 
 @pytest.mark.parametrize(

@@ -6,22 +6,17 @@ import re
 import signal
 import socket
 import stat
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 import tomli_w
+from in_process import Cli, typed
 from motion_clients.moog_device import MoogDevice
 from motion_clients.moog_wire import Mcw
 from motion_clients.motion_log import read_motion_log
 from rig import Rig, assert_soft, free_port, until
 from rig import cli as process
 
-from motionserver.cli import main
-
-Cli = Callable[..., "Ended"]
 STATES = "OFFLINE|PARKED|RAISING|READY|RUN|HOLD|PARKING|FAULT|SAFE"
 
 
@@ -29,28 +24,10 @@ def one_line(text: str) -> bool:
     return text.startswith("motionserver: ") and text.count("\n") == 1
 
 
-@dataclass(frozen=True)
-class Ended:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
 @pytest.fixture
 def cli(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Cli:
     """The command line in this process: a busy machine starts Python slowly."""
-
-    def run(*arguments: str) -> Ended:
-        monkeypatch.setattr(sys, "argv", ["motionserver", *arguments])
-        capsys.readouterr()
-        status = 0
-        try:
-            main()
-        except SystemExit as ended:
-            status = int(ended.code or 0)
-        return Ended(status, *capsys.readouterr())
-
-    return run
+    return typed(capsys, monkeypatch)
 
 
 def write(path: Path, **sections: object) -> str:
