@@ -15,13 +15,31 @@ from zlib import crc32
 
 _MAGIC: Final = 0x4D53_4D46
 _HEAD: Final = struct.Struct("<II")
-_SLOT: Final = struct.Struct("<QII")
+SLOT: Final = struct.Struct("<QII")
+"""Before every message: its sequence, its length, `crc_of` both."""
 _ATTEMPTS: Final = 4
 
 
-def _crc(sequence: int, data: bytes) -> int:
+def crc_of(sequence: int, data: bytes) -> int:
     """Over the sequence as well, so that a torn header is seen."""
     return crc32(data, crc32(sequence.to_bytes(8, "little")))
+
+
+def mapping_of(path: Path, least: int) -> mmap.mmap:
+    """Map a whole file, to read and to write.
+
+    Raises:
+        OSError: It cannot be opened.
+        ValueError: It has fewer than ``least`` bytes.
+    """
+    descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+    try:
+        size = os.fstat(descriptor).st_size
+        if size < least:
+            raise ValueError(f"{path}: not a mapped file ({size} bytes)")
+        return mmap.mmap(descriptor, size)
+    finally:
+        os.close(descriptor)
 
 
 class MappedFile:
@@ -37,17 +55,11 @@ class MappedFile:
         self.path = path
         if capacity is not None and not path.exists():
             self._create(path, capacity)
-        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
-        try:
-            size = os.fstat(descriptor).st_size
-            if size < _HEAD.size:
-                raise ValueError(f"{path}: not a mapped file ({size} bytes)")
-            self._map = mmap.mmap(descriptor, size)
-        finally:
-            os.close(descriptor)
+        self._map = mapping_of(path, _HEAD.size)
+        size = len(self._map)
         magic, capacity_found = _HEAD.unpack_from(self._map)
         self.capacity = int(capacity_found)
-        expected = _HEAD.size + 2 * (_SLOT.size + self.capacity)
+        expected = _HEAD.size + 2 * (SLOT.size + self.capacity)
         if magic != _MAGIC or size != expected:
             raise ValueError(
                 f"{path}: not a mapped file of this version; remove it and start again"
@@ -64,7 +76,7 @@ class MappedFile:
         try:
             with temporary.open("wb") as file:
                 # all room now: a page that a full disk refuses later kills whoever writes to it
-                os.posix_fallocate(file.fileno(), 0, _HEAD.size + 2 * (_SLOT.size + capacity))
+                os.posix_fallocate(file.fileno(), 0, _HEAD.size + 2 * (SLOT.size + capacity))
                 file.write(_HEAD.pack(_MAGIC, capacity))
         except OSError:
             temporary.unlink()
@@ -73,10 +85,10 @@ class MappedFile:
         temporary.rename(path)
 
     def _offset(self, slot: int) -> int:
-        return _HEAD.size + slot * (_SLOT.size + self.capacity)
+        return _HEAD.size + slot * (SLOT.size + self.capacity)
 
     def _header(self, slot: int) -> tuple[int, int, int]:
-        sequence, length, crc = _SLOT.unpack_from(self._map, self._offset(slot))
+        sequence, length, crc = SLOT.unpack_from(self._map, self._offset(slot))
         return sequence, length, crc
 
     def write(self, data: bytes) -> None:
@@ -89,10 +101,10 @@ class MappedFile:
             raise ValueError(f"{self.path}: {len(data)} bytes, a slot holds {self.capacity}")
         self._sequence += 1
         offset = self._offset(self._sequence & 1)
-        body = offset + _SLOT.size
+        body = offset + SLOT.size
         self._map[body : body + len(data)] = data
-        crc = _crc(self._sequence, data)
-        _SLOT.pack_into(self._map, offset, self._sequence, len(data), crc)
+        crc = crc_of(self._sequence, data)
+        SLOT.pack_into(self._map, offset, self._sequence, len(data), crc)
 
     def newest_sequence(self) -> int:
         """Sequence of the newest slot, valid or not: cheap, to see that something is new."""
@@ -106,9 +118,9 @@ class MappedFile:
                 sequence, length, crc = self._header(slot)
                 if sequence == 0 or length > self.capacity:
                     continue
-                body = self._offset(slot) + _SLOT.size
+                body = self._offset(slot) + SLOT.size
                 data = self._map[body : body + length]
-                if _crc(sequence, data) == crc:
+                if crc_of(sequence, data) == crc:
                     return sequence, data
         return None
 

@@ -8,18 +8,17 @@ nor, as with a file of holes, the life of the writer.
 
 from __future__ import annotations
 
-import mmap
 import os
 import struct
 from pathlib import Path
 from typing import Final
-from zlib import crc32
+
+from motionserver.telemetry.mapped import SLOT, crc_of, mapping_of
 
 _MAGIC: Final = 0x4D53_4848
 _HEAD: Final = struct.Struct("<IIIIQ")
 _NEWEST: Final = struct.Struct("<Q")
 _NEWEST_AT: Final = 16
-_SLOT: Final = struct.Struct("<QII")
 
 
 class History:
@@ -38,19 +37,13 @@ class History:
             OSError: It cannot be opened.
             ValueError: It is no history of this version.
         """
-        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
-        try:
-            size = os.fstat(descriptor).st_size
-            if size < _HEAD.size:
-                raise ValueError(f"{path}: not a history ({size} bytes)")
-            self._map = mmap.mmap(descriptor, size)
-        finally:
-            os.close(descriptor)
+        self._map = mapping_of(path, _HEAD.size)
+        size = len(self._map)
         magic, capacity, slots, _, _ = _HEAD.unpack_from(self._map)
         self.capacity, self.slots = int(capacity), int(slots)
         if magic != _MAGIC or size != _size(self.capacity, self.slots):
             raise ValueError(f"{path}: not a history of this version")
-        self._stride = _SLOT.size + self.capacity
+        self._stride = SLOT.size + self.capacity
         # whoever wrote before may have died between a message and the head
         self._sequence = max(self._message(slot)[0] for slot in range(self.slots))
         self.too_long = 0
@@ -79,9 +72,9 @@ class History:
         self._sequence += 1
         sequence = self._sequence
         offset = self._at(sequence % self.slots)
-        body = offset + _SLOT.size
+        body = offset + SLOT.size
         self._map[body : body + len(data)] = data
-        _SLOT.pack_into(self._map, offset, sequence, len(data), _crc(sequence, data))
+        SLOT.pack_into(self._map, offset, sequence, len(data), crc_of(sequence, data))
         _NEWEST.pack_into(self._map, _NEWEST_AT, sequence)
 
     def newest_sequence(self) -> int:
@@ -102,10 +95,10 @@ class History:
     def _message(self, slot: int) -> tuple[int, bytes]:
         """Number and text of what a slot holds; 0 if it is not whole."""
         offset = self._at(slot)
-        number, length, crc = _SLOT.unpack_from(self._map, offset)
-        body = offset + _SLOT.size
+        number, length, crc = SLOT.unpack_from(self._map, offset)
+        body = offset + SLOT.size
         data = self._map[body : body + min(length, self.capacity)]
-        return (number, data) if _crc(number, data) == crc else (0, b"")
+        return (number, data) if crc_of(number, data) == crc else (0, b"")
 
     def close(self) -> None:
         """Unmap; the file stays."""
@@ -121,8 +114,4 @@ def open_history(path: Path) -> History | None:
 
 
 def _size(capacity: int, slots: int) -> int:
-    return _HEAD.size + slots * (_SLOT.size + capacity)
-
-
-def _crc(sequence: int, data: bytes) -> int:
-    return crc32(data, crc32(sequence.to_bytes(8, "little")))
+    return _HEAD.size + slots * (SLOT.size + capacity)
