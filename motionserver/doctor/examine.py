@@ -125,7 +125,7 @@ def configuration_findings(config: Config, path: Path, tree: Tree) -> list[Findi
         out.append(keyfiles.token_file(keyfiles.look_at_file("page's tokens", tokens)))
         if web.tls_key:
             key = keyfiles.look_at_file("page's TLS key", Path(web.tls_key))
-            out.append(keyfiles.secret_file(key))
+            out.append(keyfiles.tls_key_file(key))
     for source in config.sources:
         if source.key_file:
             file = keyfiles.look_at_file(f"{source.kind} key", Path(source.key_file).expanduser())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from motionserver.doctor.finding import Finding, Level
@@ -71,6 +71,16 @@ def secret_file(file: KeyFile) -> Finding:
             f"chmod 600 {file.path}",
         )  # fmt: skip
     return Finding(name, Level.OK, f"{file.path}: mode {file.mode:04o}", "only this user reads it")
+
+
+def tls_key_file(file: KeyFile) -> Finding:
+    """The key of the page's certificate: a secret that everybody can read stops the page."""
+    found = secret_file(file)
+    if file.mode is None or not file.readable or not file.mode & 0o007:
+        return found
+    return replace(
+        found, level=Level.PROBLEM, means="every user may read the key: the page does not start"
+    )
 
 
 def enable_switch(file: KeyFile) -> Finding:

@@ -20,6 +20,7 @@ from motionserver.doctor.keyfiles import (
     enable_switch,
     look_at_file,
     secret_file,
+    tls_key_file,
     token_file,
 )
 from motionserver.doctor.tree import Tree
@@ -132,19 +133,21 @@ def made(tmp_path, mode):
 
 
 @pytest.mark.parametrize(
-    ("mode", "tokens", "secret"),
+    ("mode", "tokens", "secret", "tls_key"),
     [
-        (0o600, Level.OK, Level.OK),
-        (0o400, Level.OK, Level.OK),
-        (0o640, Level.PROBLEM, Level.WARNING),
-        (0o604, Level.PROBLEM, Level.WARNING),
-        (0o666, Level.PROBLEM, Level.WARNING),
+        (0o600, Level.OK, Level.OK, Level.OK),
+        (0o400, Level.OK, Level.OK, Level.OK),
+        (0o640, Level.PROBLEM, Level.WARNING, Level.WARNING),
+        (0o604, Level.PROBLEM, Level.WARNING, Level.PROBLEM),
+        (0o666, Level.PROBLEM, Level.WARNING, Level.PROBLEM),
     ],
 )
-def test_levels_of_real_files(tmp_path, mode, tokens, secret):
+def test_levels_of_real_files(tmp_path, mode, tokens, secret, tls_key):
     file = made(tmp_path, mode)
     assert file.mode == mode
-    for finding, level in ((token_file(file), tokens), (secret_file(file), secret)):
+    levels = ((token_file, tokens), (secret_file, secret), (tls_key_file, tls_key))
+    for judge, level in levels:
+        finding = judge(file)
         assert finding.level is level
         assert finding.name == "the file"
         assert f"mode {mode:04o}" in finding.found
@@ -155,12 +158,12 @@ def test_what_is_not_there(tmp_path):
     file = look_at_file("the file", tmp_path / "none")
     assert token_file(file).level is Level.OK
     assert "made at the first start" in token_file(file).means
-    for judge in (secret_file, enable_switch):
+    for judge in (secret_file, tls_key_file, enable_switch):
         assert judge(file).level is Level.PROBLEM
         assert judge(file).mend == f"sudo ls -l {file.path}"
 
 
-@pytest.mark.parametrize("judge", [token_file, secret_file, enable_switch])
+@pytest.mark.parametrize("judge", [token_file, secret_file, tls_key_file, enable_switch])
 def test_what_may_not_be_read_or_seen(judge):
     locked = judge(KeyFile("the file", Path("/x/key"), 0o600, readable=False))
     assert locked.level is Level.PROBLEM
