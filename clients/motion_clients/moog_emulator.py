@@ -17,7 +17,8 @@ from .flawed_link import FlawedLink, LinkFlaws
 from .force_sender import ForceSender
 from .moog_config import MoogConfig
 from .moog_device import MoogDevice
-from .moog_judge import JudgedLimits, MoogJudge
+from .moog_judge import MoogJudge
+from .moog_judged import JudgedLimits
 from .motion_log import MotionLog
 from .platform_accelerometer import PlatformAccelerometer, SendForce
 

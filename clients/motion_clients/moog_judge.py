@@ -1,21 +1,21 @@
 """Judges what a host sends to a Moog base, before the base's own limiter can make it harmless.
 
 Commands are taken in the order sent, one nominal period apart: a plan whose clock pauses is no
-offence, a setpoint that jumps over a gap is. Differences are taken within a stretch of
-NEW_POSITION; a stretch that an engaged base obeys begins at rest, where the base stands.
+offence, a setpoint that jumps over a gap is. Where the wire may lose commands, a gap may hide as
+many as fit into it, and the number that offends least is believed. Differences are taken within a
+stretch of NEW_POSITION; a stretch that an engaged base obeys begins at rest, where the base stands.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections import Counter, deque
-from collections.abc import Sequence
-from dataclasses import dataclass
 from math import isfinite
-from typing import Protocol
 
+from .divided_differences import likeliest_slots, rates
 from .hexapod_legs import Six
 from .moog_config import MoogConfig
+from .moog_judged import JudgedLimits, SeenDevice
 from .moog_wire import (
     COMMAND_SIZE,
     CommandMode,
@@ -33,57 +33,6 @@ ACCELERATION_TOLERANCE = 2e-3
 _DETAILS_KEPT = 20
 _KNOWN = frozenset(int(mcw) for mcw in Mcw)
 _FAULTED = (MachineState.FAULT1, MachineState.FAULT2, MachineState.FAULT3)
-
-
-class SeenDevice(Protocol):
-    """What the judge looks at of the base it stands beside."""
-
-    @property
-    def mode(self) -> CommandMode:
-        """Command mode in force."""
-        ...
-
-    @property
-    def state(self) -> MachineState:
-        """Machine state."""
-        ...
-
-    @property
-    def target(self) -> Six:
-        """Leg extensions the drives are told to reach, six [m]."""
-        ...
-
-    @property
-    def transitions(self) -> Sequence[tuple[float, MachineState]]:
-        """Every state entered, with its instant [s]."""
-        ...
-
-    @property
-    def is_at_rest(self) -> bool:
-        """Whether the base stands."""
-        ...
-
-    @property
-    def is_parked(self) -> bool:
-        """Whether the base is down and stands."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class JudgedLimits:
-    """What a leg may be asked for.
-
-    Attributes:
-        speed: Leg speed [m/s].
-        acceleration: Leg acceleration [m/s²].
-        jerk: Leg jerk [m/s³]; None records it without judging.
-        period: Nominal time between two commands [s].
-    """
-
-    speed: float = 0.6
-    acceleration: float = 8.0
-    jerk: float | None = None
-    period: float = 1 / 60
 
 
 class MoogJudge:
@@ -110,6 +59,8 @@ class MoogJudge:
         self._gap_jump = 0.0
         self._details: list[dict[str, object]] = []
         self._history: deque[Six] = deque(maxlen=3)
+        # slots between a command and the one before it, newest last
+        self._slots: deque[int] = deque([1, 1, 1], maxlen=3)
         self._stretch: tuple[CommandMode, bool] | None = None
         self._gaps = array("d")
         self._first: float | None = None
@@ -210,6 +161,7 @@ class MoogJudge:
         ):
             self._counts["stretches"] += 1
             self._history.clear()
+            self._slots.extend((1, 1, 1))
             if is_obeyed:
                 self._history.extend([device.target] * 3)
             self._stretch = (mode, is_obeyed)
@@ -224,25 +176,40 @@ class MoogJudge:
             step = max(abs(b - a) for a, b in zip(self._history[-1], legs, strict=True))
             if gap > 1.5 * self._limits.period:
                 self._gap_jump = max(self._gap_jump, step)
+        self._slots.append(self._slots_in(gap, legs))
         for leg, extension in enumerate(legs):
             self._difference(leg, extension, now)
         self._history.append(legs)
 
+    def _past(self, leg: int, extension: float) -> list[float]:
+        return [extension, *(legs[leg] for legs in reversed(self._history))]
+
+    def _slots_in(self, gap: float, legs: Six) -> int:
+        """Slots since the command before: one, unless commands may have been lost on the way."""
+        limits = self._limits
+        if not limits.may_lose or not self._history:
+            return 1
+        return likeliest_slots(
+            [self._past(leg, extension) for leg, extension in enumerate(legs)],
+            tuple(reversed(self._slots))[:2],
+            round(gap / limits.period),
+            limits.period,
+            limits.speed,
+            limits.acceleration,
+        )
+
     def _difference(self, leg: int, extension: float, now: float) -> None:
         limits = self._limits
-        past = [extension, *(legs[leg] for legs in reversed(self._history))]
+        past = self._past(leg, extension)
+        speed, bend, third = rates(past, tuple(reversed(self._slots)), limits.period)
         values: dict[str, tuple[float, float | None]] = {}
         if len(past) > 1:
-            step = past[0] - past[1]
-            values["step"] = (step, None)
-            values["speed"] = (step / limits.period, limits.speed + SPEED_TOLERANCE)
+            values["step"] = (past[0] - past[1], None)
+            values["speed"] = (speed, limits.speed + SPEED_TOLERANCE)
         if len(past) > 2:
-            bend = past[0] - 2 * past[1] + past[2]
-            allowed = limits.acceleration + ACCELERATION_TOLERANCE
-            values["acceleration"] = (bend / limits.period**2, allowed)
+            values["acceleration"] = (bend, limits.acceleration + ACCELERATION_TOLERANCE)
         if len(past) > 3:
-            third = past[0] - 3 * past[1] + 3 * past[2] - past[3]
-            values["jerk"] = (third / limits.period**3, limits.jerk)
+            values["jerk"] = (third, limits.jerk)
         for kind, (value, allowed_value) in values.items():
             self._largest[kind][leg] = max(self._largest[kind][leg], abs(value))
             if allowed_value is not None and abs(value) > allowed_value:

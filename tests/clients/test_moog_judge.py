@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from moog_host import VirtualHost, frame
 from motion_clients.moog_config import MoogConfig
 from motion_clients.moog_device import MoogDevice
-from motion_clients.moog_judge import JudgedLimits, MoogJudge
+from motion_clients.moog_judge import MoogJudge
+from motion_clients.moog_judged import JudgedLimits
 
 NEW_POSITION, PARK = 130, 210
 
@@ -205,3 +206,31 @@ def test_no_datagram_breaks_the_judge(datagrams):
         host.send(datagram)
         host.send(frame(NEW_POSITION)[:8] + datagram[:20] + bytes(4))
     verdict(host)
+
+
+def after_a_loss(limits, lost, jump=0.0):
+    """Heave swings, ``lost`` commands vanish on the way, then the swing goes on where it is."""
+    host = session(limits=limits)
+    wave = swing(0.06, 2 * pi * 0.75)
+    host.play(2.0, wave)
+    begin = host.now
+    host.be_silent(lost / 60)
+    gone = 2.0 + host.now - begin
+
+    def later(t):
+        words = list(wave(gone + t))
+        words[2] += jump
+        return words
+
+    host.play(1.0, later)
+    return verdict(host)
+
+
+@pytest.mark.parametrize("lost", [1, 2, 7])
+def test_a_wire_that_loses_commands_excuses_the_steps_it_hides(lost):
+    assert after_a_loss(None, lost)["violations"] > 0
+    assert after_a_loss(JudgedLimits(may_lose=True), lost)["violations"] == 0
+
+
+def test_a_wire_that_loses_commands_excuses_no_jump():
+    assert after_a_loss(JudgedLimits(may_lose=True), 2, jump=0.03)["violations"] > 0
