@@ -29,6 +29,7 @@ class Device:
         self.silent = False
         self.stuck = False
         self.mute = False
+        self.unreachable = False
         self._frames = 0
 
     def put_up(self, pose):
@@ -123,6 +124,8 @@ class Bench:
         if not self.seen or self.seen[-1] != self.state:
             self.seen.append(self.state)
         if setpoint is not None:
+            self.guard.told(self.now, not self.device.unreachable)
+        if setpoint is not None and not self.device.unreachable:
             self.sent.append(setpoint)
             self.device.take(setpoint)
             if not self.device.silent:

@@ -157,6 +157,7 @@ class GuardLoop:
             self._ports.publish(sent, now, due, self.guard.record)
         is_sent = setpoint is not None and self._ports.send(setpoint)
         if setpoint is not None:
+            self.guard.told(now, is_sent)
             self._setpoint = setpoint
             newest = self.guard.supervisor.device.newest
             self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))

@@ -180,7 +180,7 @@ def rules(coarse, step):
     rule(order is not Order.PARK or after in (State.PARKING, State.FAULT), "settles by itself")
     rule(after not in CUED or playback is not None, "is cued without a plan")
     # latched until an operator asks
-    if before in LATCHED and entered:
+    if before in LATCHED and entered and after is not State.SAFE:
         rule(step.had, "left by itself")
         rule(is_standing(step.before.record[2]), "left in motion")
         rule(after not in CUED and after is not State.RAISING, "left upwards")
@@ -198,8 +198,8 @@ def rules(coarse, step):
         rule(_planned(step), "runs without plans")
     # downstream trouble stops
     if newest is not None and newest.estop and given.device != "silent":
-        rule(after in LATCHED, "an open stop is not followed")
-        rule(order is not Order.RAISE, "lifts against the stop")
+        rule(after is State.SAFE, "an open stop is not followed")
+        rule(order in (Order.WAIT, Order.RESET), "moves against the stop")
     if given.device != "silent" and (newest.faults or newest.phase is Phase.DISABLED):
         rule(after in LATCHED, "a fault of the device is ignored")
     if given.device != "silent" and after in CUED:

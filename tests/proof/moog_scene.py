@@ -153,7 +153,7 @@ class Scene:
         )
         if "reset" in ops and not refusals[ops.index("reset")]:
             self.asked_ns = self.now
-        if before in LATCHED and self.state is not before:
+        if before in LATCHED and self.state not in (before, State.SAFE):
             if self.now - self.asked_ns > 2_000_000_000 or not self.asked_ns:
                 self.wild.append(f"{before} -> {self.state} without an operator's reset")
             if not stood:

@@ -11,6 +11,7 @@ from motionserver.core.kinematics.hexapod import leg_lengths, leg_motion
 from motionserver.core.motion.player import MOST_PENDING, Playback, advance, follow, state_now
 from motionserver.core.plan import Plan
 from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
+from motionserver.core.safety.edges import edges
 from motionserver.core.safety.given import GuardConfig, TickInput
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
@@ -21,6 +22,8 @@ from motionserver.core.safety.watchdog import SECOND
 from motionserver.core.state import PlatformState
 
 NEUTRAL = frozen(np.zeros(6))
+UNHEARD = 1.0
+"""Longest time without a setpoint on the wire after which a plan is still continued [s]."""
 REACH = 0.005
 """How far the first setpoint after a restart may differ from the measured legs [m]."""
 
@@ -40,6 +43,8 @@ class Guard:
             config.plan_period,
             config.dry_run,
         )
+        self._before: Playback | None = None
+        self._unsent_ns = 0
         self._last = Setpoint(
             Order.WAIT, PlatformState.at_rest(NEUTRAL), leg_lengths(self.machine, NEUTRAL)
         )
@@ -60,7 +65,7 @@ class Guard:
         supervisor.source.update(given.now_ns, given.cue)
         if given.proposal is not None:
             self._judge(given.proposal, given.now_ns)
-        answers, wishes = self._edges(given)
+        answers, wishes = edges(self.config, record, supervisor, given)
         followed = supervisor.step(record, given.now_ns, given.gap, wishes)
         if followed is not None:
             self._enter(*followed, given.now_ns)
@@ -68,51 +73,31 @@ class Guard:
             return None, answers
         return self._send(given.now_ns), answers
 
-    def _edges(self, given: TickInput) -> tuple[tuple[str, ...], frozenset[Event]]:
-        record, now = self.record, given.now_ns
-        wishes: set[Event] = set()
-        answers: list[str] = []
-        for request in given.requests:
-            record.counters[f"request_{request.op}"] += 1
-            refusal = ""
-            if request.op == "park":
-                wishes.add(Event.PARK)
-            elif request.op == "reset":
-                refusal = self._reset(now)
-            elif request.op != "engage":
-                refusal = f"unknown request {request.op!r}; allowed: engage, park, reset"
-            elif request.by not in ("console", self.config.engage):
-                refusal = (
-                    f"engaging by {request.by} is off: [operator] engage = {self.config.engage!r}"
-                )
-            elif request.by == "http" and not request.enabled:
-                refusal = "the enable input is open: somebody at the platform must hold it"
-            else:
-                refusal = self.supervisor.refusal(record, now)
-                if not refusal:
-                    wishes.add(Event.ENGAGE)
-            if refusal:
-                record.counters["request_refused"] += 1
-            answers.append(refusal)
-        if (
-            self.config.engage == "auto"
-            and not record.engaged_once
-            and not self.supervisor.refusal(record, now)
-        ):
-            record.engaged_once = True
-            wishes.add(Event.ENGAGE)
-        return tuple(answers), frozenset(wishes)
+    def told(self, now_ns: int, is_sent: bool) -> None:
+        """Learn what became of the setpoint of this tick.
 
-    def _reset(self, now_ns: int) -> str:
+        One that the network refused has moved nothing: the plan's clock stands still for it, so
+        that the next one that goes out continues where the last one ended.
+
+        Args:
+            now_ns: Now [ns].
+            is_sent: Whether it went out.
+        """
         record = self.record
-        if record.state not in (State.FAULT, State.SAFE):
-            return f"the state is {record.state}; there is nothing to reset"
-        if not is_standing(record.playback):
-            return "the platform still moves; reset when it stands"
-        record.reset_until_ns = now_ns + int(self.config.patience.reset * SECOND)
-        self.supervisor.inconsistent = ""
-        self.supervisor.astray = False
-        return ""
+        if is_sent:
+            self._unsent_ns = 0
+            return
+        record.playback = self._before
+        self._unsent_ns = self._unsent_ns or now_ns
+        unheard = (now_ns - self._unsent_ns) / SECOND
+        if record.state in RAISED and unheard > self.config.patience.feedback:
+            self.supervisor.inconsistent = (
+                f"the network takes no setpoint for {unheard * 1e3:.0f} ms: see to the way to the "
+                "platform"
+            )
+        if record.state is State.FAULT and unheard > UNHEARD:
+            # by now the device has stopped by itself
+            record.playback = None
 
     def _judge(self, proposal: Plan, now_ns: int) -> None:
         record, playback = self.record, self.record.playback
@@ -186,6 +171,7 @@ class Guard:
     def _send(self, now_ns: int) -> Setpoint:
         record = self.record
         order = self._order(now_ns)
+        self._before = record.playback
         if record.playback is not None and order is Order.FOLLOW:
             record.playback = advance(record.playback, self.config.send_period)
             self._go_home(now_ns)

@@ -83,6 +83,7 @@ TABLE: Final[dict[State, dict[Event, State]]] = {
         **_DOWNSTREAM,
         Event.PARK: State.PARKING,
         Event.SOURCE_SILENT: State.PARKING,
+        Event.LOOP_GAP: State.HOLD,
         Event.CUEING: State.RUN,
     },
     State.RUN: {
@@ -102,7 +103,8 @@ TABLE: Final[dict[State, dict[Event, State]]] = {
         Event.PARK_TIMEOUT: State.FAULT,
         Event.DEVICE_DOWN: State.PARKED,
     },
-    State.FAULT: _RESET,
+    # an open stop is followed whatever the fault: the rest of the plan is not played against it
+    State.FAULT: {Event.ESTOP: State.SAFE, **_RESET},
     State.SAFE: _RESET,
 }
 """Cells that lead somewhere else; in every other cell the state stays."""

@@ -105,8 +105,8 @@ inline notice() {
 #define is_reset (event == E_RESET_BLIND || event == E_RESET_UP || event == E_RESET_DOWN)
 
 inline account() {
-  /* FAULT and SAFE are left by an operator's edge only */
-  assert(next == state || !latched || (asked && is_reset));
+  /* FAULT and SAFE are left by an operator's edge only, but that a stop is followed in a fault */
+  assert(next == state || !latched || (asked && is_reset) || (estop && next == SAFE));
   /* it runs from READY and HOLD only, with a source that drives, plans, and a sound device */
   assert(next != RUN || state == READY || state == HOLD || state == RUN);
   assert(next != RUN || (source == DRIVES && planned));
@@ -118,7 +118,7 @@ inline account() {
   assert(next != PARKED || state == PARKED || phase == DOWN);
   assert(next != PARKED || lost || valid == 0 || phase != UP);
   /* an open stop, a fault and a silent device leave nothing that cues, raises or parks */
-  assert(!estop || next == SAFE || next == FAULT);
+  assert(!estop || next == SAFE);
   assert(!fault || next == SAFE || next == FAULT);
   assert(!lost || !(next == RAISING || next == READY || next == RUN || next == HOLD
                     || next == PARKING));

@@ -160,3 +160,64 @@ def test_a_measured_pose_that_breaks_a_rule_is_a_fault():
     b.device.answer = lambda now: replace(whole(now), legs=None, pose=swung())
     b.until("FAULT", 1.0)
     assert "cannot stand here: plan rejected: joint-angle" in b.record.reason
+
+
+def test_an_emergency_stop_is_followed_while_a_fault_plays_its_plan():
+    b = in_state("RUN")
+    away(b, (-0.05, 0.02, 0.04, 0.0, 0.0, 0.0), 3.0)
+    b.tick("park")
+    b.run(0.3)
+    b.device.silent = True
+    b.until("FAULT", 0.3)
+    b.device.silent = False
+    b.run(0.05)
+    assert b.sent[-1].order is Order.FOLLOW
+    b.device.estop = True
+    b.until("SAFE", 0.1)
+    b.run(0.02)
+    assert b.sent[-1].order is Order.WAIT
+    # it stays latched when the stop is released
+    b.device.estop = False
+    stands(b, 1.0)
+    assert b.state == "SAFE"
+
+
+def test_a_network_that_refuses_for_a_moment_pauses_the_plan():
+    b = in_state("RUN")
+    b.tick("park")
+    b.run(0.3)
+    clock, frames = b.record.playback.clock, len(b.sent)
+    b.device.unreachable = True
+    b.run(0.06)
+    assert b.record.playback.clock == clock
+    assert len(b.sent) == frames
+    b.device.unreachable = False
+    b.until("PARKED", 20.0)
+    assert "FAULT" not in b.seen
+    legal(b)
+
+
+@pytest.mark.parametrize("state", ["READY", "RUN", "HOLD", "PARKING"])
+@pytest.mark.parametrize("seconds", [0.4, 2.0])
+def test_a_network_that_refuses_is_a_fault(state, seconds):
+    b = in_state(state)
+    b.device.unreachable = True
+    answer = b.device.answer(b.now)
+    for _ in range(round(seconds * 240)):
+        # a device that talks without being asked hides nothing
+        b._answer = replace(answer, arrival_ns=b.now)
+        b.tick()
+        if b.state == "FAULT":
+            break
+    assert b.state == "FAULT"
+    assert "the network takes no setpoint" in b.record.reason
+    b.run(seconds)
+    b.device.unreachable = False
+    frames = len(b.sent)
+    stands(b, 8.0)
+    followed = [s for s in b.sent[frames:] if s.order is Order.FOLLOW]
+    if seconds > 1.0:
+        assert not followed
+    legal(b)
+    assert b.tick("reset") == ("",)
+    b.until("PARKED", 40.0)

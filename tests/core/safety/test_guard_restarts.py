@@ -103,3 +103,13 @@ def test_states_and_counters_are_told():
     assert State(b.state) in RAISED
     assert record.counters["setpoints"] == len(b.sent)
     assert pytest.approx(1e9, rel=1e-6) == TICK_NS * 240
+
+
+def test_a_long_gap_while_ready_holds_and_parks_without_a_source():
+    b = bench()
+    b.engaged("READY")
+    b.source = False
+    b.tick(gap_ns=310_000_000)
+    assert b.state == "HOLD"
+    b.until("PARKING", 2.5)
+    b.until("PARKED", 20.0)
