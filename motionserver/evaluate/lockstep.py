@@ -119,7 +119,7 @@ def drive(
         playback, now = advance(playback, start - now), start
         now_ns = round(start * SECOND_NS)
         hearing.until(start)
-        wanted = intake.stimulus(head, period, not gate.freshness.is_stale(now_ns))
+        wanted = intake.stimulus(head, period, gate.is_fresh(now_ns))
 
         if trouble is not None:
             trouble.ride(mind)

@@ -23,6 +23,9 @@ MOST_SENDERS = 8
 """Senders per input whose format is remembered; more are strangers, and start anew."""
 
 
+UNPROVEN = {"size", "magic", "byte_order", "version", "incompat", "length", "checksum"}
+UNPROVEN |= {"hmac_missing", "hmac_wrong", "hmac_unexpected"}
+"""Refusals of packets that need not be the owner's where the owner signs: anybody can send them."""
 Datagrams = list[tuple[bytes, str, int]]
 """Bytes, sender, arrival [ns]."""
 
@@ -144,6 +147,8 @@ class Inputs:
             return source.decode(data, address, arrival_ns)
         except SourceError as error:
             self._refused(error.reason, f"{source.name} from {address}: {error}")
+            if source.options.key is None or error.reason not in UNPROVEN:
+                self.vehicle.spoilt(source.name, address, arrival_ns)
         except Exception as error:
             # a third party's format that stumbles costs its packet, not the period
             self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")

@@ -126,12 +126,11 @@ class PlannerLoop:
         for motion in vehicle:
             self._intake.offer(motion)
         self._state = self._clock.read(now)
-        fresh = self._inputs.vehicle.freshness
-        stale_after = fresh.stale_after_ns()
-        status = CueStatus(fresh.newest_ns or 0, stale_after, self._inputs.vehicle.mode)
+        gate = self._inputs.vehicle
+        status = CueStatus(gate.believed_ns(now), gate.freshness.stale_after_ns(), gate.mode)
         self._maps.cue.write(pack_cue(status, now))
         tuning = self._thinker.tuning
-        wanted = self._state is State.RUN and not fresh.is_stale(now)
+        wanted = self._state is State.RUN and gate.is_fresh(now)
         head = Head(self.options.arm, tuning.scale)
         stimulus = self._intake.stimulus(head, self.options.period, wanted)
         if self._state not in CUED:

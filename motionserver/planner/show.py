@@ -172,7 +172,8 @@ class PlannerView:
                 "age_s": None if age is None else round(age / 1e9, 4),
                 "rate_hz": round(gate.freshness.rate_hz(), 2),
                 "mode": gate.mode.name.lower(),
-                "fresh": not gate.freshness.is_stale(now_ns),
+                "fresh": gate.is_fresh(now_ns),
+                "bad_share": round(gate.spoilage.share(now_ns), 3),
                 "last_error": inputs.last_error[:300],
             },
             "solver": {

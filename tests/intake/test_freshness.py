@@ -22,7 +22,6 @@ def test_nothing_has_come() -> None:
     assert fresh.newest_ns is None
     assert fresh.age_ns(5) is None
     assert fresh.is_stale(5)
-    assert fresh.fresh_for_ns(5) == 0
     assert fresh.rate_hz() == 0.0
 
 
@@ -55,15 +54,6 @@ def test_only_the_last_second_counts() -> None:
     fresh.arrived(now + 2 * SECOND_NS)
     assert fresh.interval_ns() == 100 * MS
     assert fresh.rate_hz() == 0.0
-
-
-def test_fresh_since_the_last_break() -> None:
-    fresh, now = after(*[10.0] * 20)
-    assert fresh.fresh_for_ns(now) == 200 * MS
-    assert fresh.fresh_for_ns(now + 60 * MS) == 0
-    fresh.arrived(now + 60 * MS)
-    fresh.arrived(now + 70 * MS)
-    assert fresh.fresh_for_ns(now + 70 * MS) == 10 * MS
 
 
 def test_bursts_at_one_instant_have_no_rate() -> None:

@@ -179,3 +179,33 @@ def test_a_decoder_of_its_own_for_each_sender() -> None:
         source.decode(game(0.0), address, 0)
     assert isinstance(source.formats["a"], BeamNgSource)
     assert source.formats["a"] is not source.formats["b"]
+
+
+def signed(sequence: int, key: bytes | None, x: float = 1.0) -> bytes:
+    motion = Motion((x, 0.0, 0.0), (0.0, 0.0, 0.0))
+    cue = Cue(1, sequence, 0, 10 * sequence * MS, motion)
+    return encode_cue(cue, key)
+
+
+@pytest.mark.parametrize("key", [None, b"k" * 32])
+def test_nonsense_in_the_owners_name_holds_unless_anybody_could_have_sent_it(
+    key: bytes | None,
+) -> None:
+    inputs, wire = room("native", key)
+    for k in range(50):
+        at = 10 * k * MS
+        wire.waiting = [(signed(k + 1, key), "own", at), (b"junk", "own", at)]
+        inputs.poll()
+    assert inputs.vehicle.is_fresh(490 * MS) == (key is not None)
+    assert inputs.counters["refused_size"] == 50
+
+
+def test_signed_nonsense_is_the_owners() -> None:
+    key = b"k" * 32
+    inputs, wire = room("native", key)
+    for k in range(50):
+        x = 200.0 if k % 2 else 1.0
+        wire.waiting = [(signed(k + 1, key, x), "own", 10 * k * MS)]
+        inputs.poll()
+    assert inputs.counters["refused_out_of_range"] == 25
+    assert not inputs.vehicle.is_fresh(490 * MS)

@@ -19,7 +19,6 @@ class Freshness:
 
     def __init__(self) -> None:
         self._arrivals: deque[int] = deque(maxlen=1024)
-        self._fresh_since: int | None = None
 
     @property
     def newest_ns(self) -> int | None:
@@ -28,8 +27,6 @@ class Freshness:
 
     def arrived(self, now_ns: int) -> None:
         """Note a packet that was believed."""
-        if self.is_stale(now_ns):
-            self._fresh_since = now_ns
         self._arrivals.append(now_ns)
         while now_ns - self._arrivals[0] > SECOND_NS:
             self._arrivals.popleft()
@@ -54,12 +51,6 @@ class Freshness:
         """True if nothing came for too long, or ever."""
         age = self.age_ns(now_ns)
         return age is None or age > self.stale_after_ns()
-
-    def fresh_for_ns(self, now_ns: int) -> int:
-        """How long it has been fresh without a break [ns]; 0 when stale."""
-        if self.is_stale(now_ns) or self._fresh_since is None:
-            return 0
-        return now_ns - self._fresh_since
 
     def rate_hz(self) -> float:
         """Packets believed per second [Hz]."""

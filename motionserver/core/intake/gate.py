@@ -10,6 +10,7 @@ import numpy as np
 
 from motionserver.core.axes import GRAVITY, Array
 from motionserver.core.intake.freshness import SECOND_NS, Freshness
+from motionserver.core.intake.spoilage import Spoilage
 from motionserver.core.state import DriveMode, VehicleMotion
 
 REORDER_NS: Final = 2 * SECOND_NS
@@ -40,6 +41,7 @@ class Gate:
 
     def __init__(self, may_change_owner: Callable[[], bool] = lambda: True) -> None:
         self.freshness = Freshness()
+        self.spoilage = Spoilage()
         self.owner: Owner | None = None
         self.mode = DriveMode.DRIVE
         self.lost = 0
@@ -69,6 +71,7 @@ class Gate:
         elif (order := self._order(motion)) is not None:
             return order
         if not _is_plausible(motion):
+            self.spoilt(source, address, now)
             return "out-of-range"
         if who != self.owner:
             self._hand_over(who)
@@ -82,7 +85,24 @@ class Gate:
         self._sequence = motion.sequence
         self.mode = motion.mode
         self.freshness.arrived(now)
+        self.spoilage.heard(now, is_bad=False)
         return None
+
+    def spoilt(self, source: str, address: str, now_ns: int) -> None:
+        """Note a packet that says what cannot be; a stranger's is not the owner's fault."""
+        if self.owner is not None and (self.owner.source, self.owner.address) == (source, address):
+            self.spoilage.heard(now_ns, is_bad=True)
+
+    def believed_ns(self, now_ns: int) -> int:
+        """Arrival of the newest packet that may move the platform [ns]; 0 = none.
+
+        What comes from an owner whose packets are spoilt is told as what never came.
+        """
+        return 0 if self.spoilage.is_spoilt(now_ns) else self.freshness.newest_ns or 0
+
+    def is_fresh(self, now_ns: int) -> bool:
+        """True if the owner's packets arrive in time, and nearly all of them can be believed."""
+        return not self.freshness.is_stale(now_ns) and not self.spoilage.is_spoilt(now_ns)
 
     def _may_own(self, now_ns: int) -> bool:
         if self.owner is None:
@@ -105,6 +125,7 @@ class Gate:
     def _hand_over(self, who: Owner) -> None:
         self.owner = who
         self.freshness = Freshness()
+        self.spoilage = Spoilage()
         self._sequence = None
         self._least_offset = None
 

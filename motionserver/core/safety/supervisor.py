@@ -156,7 +156,7 @@ class Supervisor:
             return f"the platform does not follow: {self.device.error * 1e3:.1f} mm off"
         if event is Event.TROUBLE:
             if not self.source.is_fresh(now_ns):
-                return "the source is stale: no packet from the simulator"
+                return "the source is stale: nothing that can be believed comes from the simulator"
             if self.source.is_paused:
                 return "the simulator pauses"
             return "no plan was accepted from the planner"
