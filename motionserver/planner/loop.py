@@ -127,7 +127,8 @@ class PlannerLoop:
             self._intake.offer(motion)
         self._state = self._clock.read(now)
         gate = self._inputs.vehicle
-        status = CueStatus(gate.believed_ns(now), gate.freshness.stale_after_ns(), gate.mode)
+        newest = gate.believed_ns(now, self._state in CUED)
+        status = CueStatus(newest, gate.freshness.stale_after_ns(), gate.mode)
         self._maps.cue.write(pack_cue(status, now))
         tuning = self._thinker.tuning
         wanted = self._state is State.RUN and gate.is_fresh(now)

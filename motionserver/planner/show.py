@@ -174,7 +174,7 @@ class PlannerView:
                 "mode": gate.mode.name.lower(),
                 "fresh": gate.is_fresh(now_ns),
                 "bad_share": round(gate.spoilage.share(now_ns), 3),
-                "last_error": inputs.last_error[:300],
+                "last_error": (gate.plausibility.complaint() or inputs.last_error)[:300],
             },
             "solver": {
                 "backend": thinker.tuning.backend,

@@ -83,8 +83,8 @@ def driven(bad_from: tuple[str, str]) -> Gate:
 def test_an_owner_that_sends_too_much_nonsense_is_not_fresh() -> None:
     now = 990 * MS
     assert not driven(A).is_fresh(now)
-    assert driven(A).believed_ns(now) == 0
-    assert driven(B).believed_ns(now) == now
+    assert driven(A).believed_ns(now, is_cued=True) == 0
+    assert driven(B).believed_ns(now, is_cued=False) == now
     assert driven(B).is_fresh(now), "a stranger's nonsense is not the owner's fault"
     gate = driven(A)
     for k in range(100, 201):

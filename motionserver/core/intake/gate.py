@@ -10,6 +10,7 @@ import numpy as np
 
 from motionserver.core.axes import GRAVITY, Array
 from motionserver.core.intake.freshness import SECOND_NS, Freshness
+from motionserver.core.intake.plausibility import Plausibility
 from motionserver.core.intake.spoilage import Spoilage
 from motionserver.core.state import DriveMode, VehicleMotion
 
@@ -42,6 +43,7 @@ class Gate:
     def __init__(self, may_change_owner: Callable[[], bool] = lambda: True) -> None:
         self.freshness = Freshness()
         self.spoilage = Spoilage()
+        self.plausibility = Plausibility()
         self.owner: Owner | None = None
         self.mode = DriveMode.DRIVE
         self.lost = 0
@@ -86,6 +88,8 @@ class Gate:
         self.mode = motion.mode
         self.freshness.arrived(now)
         self.spoilage.heard(now, is_bad=False)
+        if motion.mode is DriveMode.DRIVE:
+            self.plausibility.heard(motion)
         return None
 
     def spoilt(self, source: str, address: str, now_ns: int) -> None:
@@ -93,12 +97,19 @@ class Gate:
         if self.owner is not None and (self.owner.source, self.owner.address) == (source, address):
             self.spoilage.heard(now_ns, is_bad=True)
 
-    def believed_ns(self, now_ns: int) -> int:
+    def believed_ns(self, now_ns: int, is_cued: bool) -> int:
         """Arrival of the newest packet that may move the platform [ns]; 0 = none.
 
-        What comes from an owner whose packets are spoilt is told as what never came.
+        What comes from an owner whose packets are spoilt is told as what never came; so is what
+        seems to have wrong units, but that only keeps a drive from beginning.
+
+        Args:
+            now_ns: Now [ns].
+            is_cued: Whether the platform is up and cued.
         """
-        return 0 if self.spoilage.is_spoilt(now_ns) else self.freshness.newest_ns or 0
+        if self.spoilage.is_spoilt(now_ns) or (not is_cued and self.plausibility.complaint()):
+            return 0
+        return self.freshness.newest_ns or 0
 
     def is_fresh(self, now_ns: int) -> bool:
         """True if the owner's packets arrive in time, and nearly all of them can be believed."""
@@ -126,6 +137,7 @@ class Gate:
         self.owner = who
         self.freshness = Freshness()
         self.spoilage = Spoilage()
+        self.plausibility = Plausibility()
         self._sequence = None
         self._least_offset = None
 

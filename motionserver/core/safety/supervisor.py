@@ -172,7 +172,7 @@ class Supervisor:
         if newest is None or newest.phase is not Phase.DOWN:
             return "the device does not say that it is down and ready"
         if not self.source.is_fresh(now_ns):
-            return "no fresh source: start the simulator first"
+            return "no fresh source that can be believed: start the simulator first"
         return ""
 
 
