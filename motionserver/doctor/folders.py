@@ -10,7 +10,7 @@ from typing import Final
 from motionserver.doctor.finding import Finding, Level
 from motionserver.doctor.mends import RUN_DIR
 from motionserver.doctor.tree import Tree
-from motionserver.supervisor.service import LONGEST_PATH
+from motionserver.supervisor.rundir import LONGEST_PATH
 
 RUN_SPACE: Final = 8 << 20
 """Free bytes for a run: a page of a mapped file that finds none kills its process."""

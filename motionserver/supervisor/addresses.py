@@ -22,6 +22,28 @@ def open_link(local: tuple[str, int]) -> socket.socket:
     return _bound("[platform] local_host, local_port", *local, socket.SOCK_DGRAM)
 
 
+def claim_platform(host: str, port: int) -> socket.socket:
+    """Take the platform for this server alone, as long as the socket or a copy of it lives.
+
+    A name without a file, known to every process of this computer (or container): guards inherit
+    it, so that it is held until the last of them has parked.
+
+    Raises:
+        ConfigError: Another server here has it.
+    """
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        claim.bind(f"\0motionserver/platform/{host}:{port}")
+    except OSError as error:
+        claim.close()
+        raise ConfigError(
+            "[platform] host, port",
+            f"another server on this computer drives {host}:{port}",
+            "Stop it first: one platform has one server.",
+        ) from error
+    return claim
+
+
 def try_addresses(sources: list[dict[str, Any]], page: dict[str, Any] | None) -> None:
     """Bind everything the children will bind, all at once, and let go of it.
 

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import fcntl
 import json
 import logging
 import os
 import signal
 from pathlib import Path
-from typing import Any, Final, TextIO
+from typing import Any, Final
 
 from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
-from motionserver.supervisor.addresses import open_link, try_addresses
+from motionserver.supervisor.addresses import claim_platform, open_link, try_addresses
 from motionserver.supervisor.child import Child
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
-from motionserver.telemetry.blackbox.room import clear_room, make_room
+from motionserver.supervisor.rundir import clean, take
+from motionserver.telemetry.blackbox.room import make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
 from motionserver.telemetry.ticker import now_ns
@@ -26,14 +26,6 @@ PARK_PATIENCE: Final = 90.0
 """Longest wait for the guard to park when the service ends [s]."""
 BOX_PATIENCE: Final = 10.0
 """Longest wait for a dump when the service ends [s]."""
-LEFT: Final = (
-    *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
-    *("config.json", "web.json", "tuning.json"),
-)
-"""What a run leaves in its directory, but for the locks."""
-LONGEST_PATH: Final = 70
-"""Longest run directory [bytes]: a unix socket's path has 108 at most."""
-
 log = logging.getLogger("motionserver.supervisor")
 
 
@@ -56,14 +48,16 @@ class Service:
         """
         self.run_dir = run_dir
         with contextlib.ExitStack() as undo:
-            self._lock = undo.enter_context(self._take(run_dir))
+            self._lock = undo.enter_context(take(run_dir))
+            peer = resolved["platform"]["host"], resolved["platform"]["port"]
+            self._claim = undo.enter_context(claim_platform(*peer))
             self._link = undo.enter_context(open_link(local))
             try_addresses(resolved["sources"], resolved["web"] if config_web else None)
             undo.pop_all()
         self.local_port: int = self._link.getsockname()[1]
         web = dict(resolved["web"])
         core = {key: value for key, value in resolved.items() if key != "web"}
-        self._clean()
+        clean(self.run_dir)
         try:
             for name, content in (("config.json", core), ("web.json", web)):
                 # keys of signed sources are in it
@@ -71,14 +65,14 @@ class Service:
                 (run_dir / name).write_text(json.dumps(content), "utf-8")
             self._maps = Maps(run_dir, create=True)
         except OSError as error:
-            self._link.close()
-            self._lock.close()
+            self._let_go()
             raise ConfigError(
                 "[server] run_dir", f"{run_dir}: {error.strerror}", "Give a folder with 1 MB free."
             ) from error
         descriptor = self._link.fileno()
         guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
-        self.guards = [Child(name, guard, (descriptor,)) for name in ("guard", "spare guard")]
+        inherited = descriptor, self._claim.fileno()
+        self.guards = [Child(name, guard, inherited) for name in ("guard", "spare guard")]
         self.planner = Child("planner", ("-m", "motionserver.planner", str(run_dir)))
         self.planner.may_start = self._is_not_cued
         self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
@@ -102,37 +96,6 @@ class Service:
         child = Child("black box", ("-m", "motionserver.telemetry.blackbox", *where))
         child.wanted = kept > 0
         return child
-
-    @staticmethod
-    def _take(run_dir: Path) -> TextIO:
-        where, other = "[server] run_dir", "Choose another folder."
-        if len(os.fsencode(run_dir.absolute())) > LONGEST_PATH:
-            raise ConfigError(where, f"{run_dir} is too long a path for sockets", other)
-        try:
-            run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if run_dir.stat().st_uid != os.getuid():
-                raise ConfigError(where, f"{run_dir} belongs to somebody else", other)
-            run_dir.chmod(0o700)
-            lock = (run_dir / "service.lock").open("w")
-        except OSError as error:
-            raise ConfigError(where, f"{run_dir}: {error.strerror}", other) from error
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            lock.close()
-            raise ConfigError(
-                where,
-                f"another server runs in {run_dir}",
-                "Stop it first: one platform has one server.",
-            ) from error
-        return lock
-
-    def _clean(self) -> None:
-        """Nothing of this or an earlier run may be taken for a living server."""
-        for pattern in LEFT:
-            for stale in self.run_dir.glob(pattern):
-                stale.unlink(missing_ok=True)
-        clear_room(self.run_dir)
 
     def leave(self) -> None:
         """End softly: park, then stop everything."""
@@ -169,10 +132,13 @@ class Service:
         teller.cancel()
         ended = "parked" if self.exit_status == 0 else "standing in a fault"
         self._manager.tell(STATUS=f"ended {ended}")
-        self._link.close()
-        self._clean()
-        self._lock.close()
+        clean(self.run_dir)
+        self._let_go()
         return self.exit_status
+
+    def _let_go(self) -> None:
+        for held in (self._link, self._claim, self._lock):
+            held.close()
 
     async def _park(self) -> int:
         """Let the active guard park; the spare is told too, and parks if its turn comes."""

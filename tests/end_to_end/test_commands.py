@@ -77,6 +77,13 @@ def test_commands_of_an_operator(tmp_path: Path, cli: Cli) -> None:
         assert second.returncode == 2
         assert one_line(second.stderr)
         assert "another server runs in" in second.stderr
+        elsewhere = tmp_path / "elsewhere.toml"
+        told = rig.config.read_text("utf-8").replace(str(rig.run_dir), str(tmp_path / "other"))
+        elsewhere.write_text(told.replace(str(rig.cue_port), str(free_port())), "utf-8")
+        third = process("run", str(elsewhere))
+        assert third.returncode == 2
+        assert one_line(third.stderr)
+        assert f"drives 127.0.0.1:{rig.base.port}" in third.stderr
         assert rig.end() == 0
         assert rig.leftovers() == []
         left = {path.name for path in rig.run_dir.iterdir()}
