@@ -184,7 +184,11 @@ class GuardLoop:
 
     def _show(self, now: int) -> None:
         if self._setpoint is not None:
-            ticks = {**self._lateness.summary(), "scheduling": self.scheduling}
+            ticks = {
+                **self._lateness.summary(),
+                "scheduling": self.scheduling,
+                "filter": self._ports.filter,
+            }
             self._ports.show(
                 snapshot(self.guard, self.options, self._setpoint, ticks, self._rates(), now)
             )

@@ -1,5 +1,7 @@
 """The planner's wake-ups: once a period on the grid of the send slots, whatever the slot is."""
 
+from itertools import pairwise
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,7 +27,7 @@ def test_every_rate_keeps_its_period() -> None:
     for rate_hz, per_plan in ((60.0, 1), (100.0, 1), (240.0, 2), (480.0, 5), (1000.0, 10)):
         slot = int(1e9 / rate_hz)
         wakes = drive(rate_hz, per_plan, 8 * MS, 3 * MS)
-        gaps = {b - a for a, b in zip(wakes[1:], wakes[2:], strict=False)}
+        gaps = {b - a for a, b in pairwise(wakes[1:])}
         assert gaps == {per_plan * slot}, rate_hz
 
 
@@ -36,7 +38,7 @@ def test_it_wakes_one_budget_before_a_slot() -> None:
 
 def test_who_is_behind_skips_whole_periods() -> None:
     wakes = drive(1000.0, 10, 8 * MS, 12 * MS)
-    assert {b - a for a, b in zip(wakes[1:], wakes[2:], strict=False)} == {20 * MS}
+    assert {b - a for a, b in pairwise(wakes[1:])} == {20 * MS}
 
 
 @given(
