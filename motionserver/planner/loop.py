@@ -34,6 +34,7 @@ from motionserver.planner.wake import next_wake
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
+from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Ticker, now_ns
@@ -85,10 +86,11 @@ class PlannerLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
-        self.scheduling = take_priority(30, self.options.realtime)
+        scheduling = take_priority(30, self.options.realtime)
+        self.scheduling = f"{scheduling}, {lock_memory(self.options.realtime)}"
         self._ticker = Ticker(self._wake)
         self._arm(now_ns())
-        log.info("planner ready: %s", self._thinker.tuning.algorithm)
+        log.info("planner ready: %s; %s", self._thinker.tuning.algorithm, self.scheduling)
         try:
             return await self._done
         finally:
