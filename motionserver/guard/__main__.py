@@ -13,6 +13,7 @@ from pathlib import Path
 from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import read_options
 from motionserver.guard.ports import open_link
+from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.parent import follow_parent
 from motionserver.telemetry.realtime import take_priority
 
@@ -34,6 +35,7 @@ def main() -> int:
     scheduling = take_priority(50, options.realtime)
     gc.collect()
     gc.freeze()
+    memory = lock_memory(options.realtime)
     with (run_dir / "guard.lock").open("a+") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         lock.seek(0)
@@ -42,7 +44,7 @@ def main() -> int:
             # the guard before it parked and left in order: nothing remains to be done
             return int(ended)
         lock.truncate(0)
-        loop = GuardLoop(options, run_dir, link, scheduling)
+        loop = GuardLoop(options, run_dir, link, f"{scheduling}, {memory}")
         signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
         if told or sys.argv[3:] == ["leave"]:
             loop.ask_to_leave("told before its turn came")

@@ -8,12 +8,14 @@ import logging
 import signal
 import socket
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
 from motionserver.core.safety.inherit import inherit
+from motionserver.core.safety.patient import slices_per_tick
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.states import RAISED, State
 from motionserver.core.safety.supervisor import is_standing
@@ -40,15 +42,16 @@ class GuardLoop:
         self, options: GuardOptions, run_dir: Path, link: socket.socket, scheduling: str
     ) -> None:
         self.options = options
-        self.guard = Guard(options.guard)
-        self._box = GuardBox(run_dir, self.guard)
-        self._ports = Ports(options, run_dir, link, self.guard.record.counters, self._box.accepted)
-        self._requests = RequestServer(run_dir / "guard.sock")
         ticks = 1
         while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
             ticks += 1
         self._ticks_per_send = ticks
         self._tick_ns = SECOND / (ticks * options.rate_hz)
+        slices = slices_per_tick(self._tick_ns / SECOND)
+        self.guard = Guard(replace(options.guard, slices=slices))
+        self._box = GuardBox(run_dir, self.guard)
+        self._ports = Ports(options, run_dir, link, self.guard.record.counters, self._box.accepted)
+        self._requests = RequestServer(run_dir / "guard.sock")
         self._lateness = Lateness(int(self._tick_ns))
         self._leave = False
         self._seen_event = 0
@@ -161,6 +164,9 @@ class GuardLoop:
             self._setpoint = setpoint
             newest = self.guard.supervisor.device.newest
             self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))
+        if given.proposal is not self.guard.judged:
+            # the black box writes a verdict into the tick it was given in
+            given = replace(given, proposal=self.guard.judged)
         self._box.note(given, setpoint, answers, is_sent)
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):
@@ -171,13 +177,18 @@ class GuardLoop:
             gc.collect()
         self._maybe_end(now)
         is_last = self._done is not None and self._done.done()
-        if is_last or now - self._snapshot_ns > SNAPSHOT_NS:
+        # a tick has room for one of the two, a snapshot or slices of a check
+        if is_last or (now - self._snapshot_ns > SNAPSHOT_NS and not self.guard.is_checking):
             self._snapshot_ns = now
             self._show(now)
 
     def _show(self, now: int) -> None:
         if self._setpoint is not None:
-            ticks = {**self._lateness.summary(), "scheduling": self.scheduling}
+            ticks = {
+                **self._lateness.summary(),
+                "scheduling": self.scheduling,
+                "filter": self._ports.filter,
+            }
             self._ports.show(
                 snapshot(self.guard, self.options, self._setpoint, ticks, self._rates(), now)
             )

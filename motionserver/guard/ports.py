@@ -21,6 +21,7 @@ from motionserver.guard.options import GuardOptions
 from motionserver.platforms.base import PlatformPacketError
 from motionserver.platforms.registry import make_platform
 from motionserver.telemetry.link import STATES, GuardClock, Maps, unpack_cue
+from motionserver.telemetry.sieve import dropped, sieve
 from motionserver.telemetry.ticker import now_ns
 
 DRAIN: Final = 64
@@ -47,11 +48,19 @@ class Ports:
         self._accepted_id = 0
         self._keep = keep
         self._writer = WillWriter()
+        # strangers are dropped in the kernel: a flood leaves the buffer to the platform's answers
+        refusal = sieve(link, [options.peer])
+        self.filter = f"none: {refusal}" if refusal else f"{options.peer[0]} alone"
+        self._dropped = dropped(link)
 
     def feedback(self) -> tuple[Feedback, ...]:
         """Answers of the device that wait, at most `DRAIN`; everything else is counted."""
         out: list[Feedback] = []
         counters = self._counters
+        lost = dropped(self._link)
+        if lost != self._dropped:
+            counters["feedback_foreign"] += lost - self._dropped
+            self._dropped = lost
         for _ in range(DRAIN):
             try:
                 data, peer = self._link.recvfrom(2048)

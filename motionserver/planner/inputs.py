@@ -8,14 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from motionserver.core.intake.gate import Gate
-from motionserver.core.state import VehicleMotion
+from motionserver.core.intake.gate import REORDER_NS, Gate
+from motionserver.core.state import DriveMode, VehicleMotion
+from motionserver.planner.crowd import Crowd
 from motionserver.planner.options import InputOptions
 from motionserver.planner.preview import PreviewInlet
 from motionserver.sources.base import SourceError, SourceFormat
 from motionserver.sources.registry import make_source
+from motionserver.sources.sizes import sizes_of
 from motionserver.sources.udp import UdpInput
 from motionserver.sources.zenoh_input import ZenohInput, link_of
+from motionserver.telemetry.ticker import now_ns
 
 log = logging.getLogger("motionserver.planner")
 SHOWN_ERRORS = 5
@@ -54,6 +57,7 @@ class Input:
     transport: Transport
     formats: dict[str, SourceFormat] = field(default_factory=dict)
     drain_previews: Callable[[], Datagrams] = list
+    crowd: Crowd | None = None
 
     @property
     def name(self) -> str:
@@ -88,7 +92,19 @@ def open_input(options: InputOptions) -> Input:
             options.topic, [endpoint], list(options.connect), options.preview_topic, file
         )
         return Input(options, transport, drain_previews=transport.drain_previews)
-    return Input(options, UdpInput(options.host, options.port))
+    link = UdpInput(options.host, options.port)
+    return Input(options, link, crowd=Crowd(link.socket, sizes_of(options.kind)))
+
+
+def is_there(gate: Gate, now_ns: int) -> bool:
+    """Whether the gate's owner still holds it: nobody else could own it now."""
+    age = gate.freshness.age_ns(now_ns)
+    return age is not None and age <= REORDER_NS and gate.mode is not DriveMode.BYE
+
+
+def _peer(name: str) -> tuple[str, int]:
+    host, _, port = name.rpartition(":")
+    return host, int(port)
 
 
 class Inputs:
@@ -116,7 +132,9 @@ class Inputs:
                 motion = self._decoded(source, datagram)
                 if motion is not None:
                     self._take_preview(source, datagram[1], motion)
-            for datagram in source.transport.drain():
+            datagrams = source.transport.drain()
+            self._watch(source, len(datagrams))
+            for datagram in datagrams:
                 motion, address = self._decoded(source, datagram), datagram[1]
                 if motion is None:
                     continue
@@ -139,6 +157,26 @@ class Inputs:
             # the newest is what counts; all sources were read by now
             vehicle[-1] = self.previews.attach(vehicle[-1])
         return vehicle, sensor
+
+    def _watch(self, source: Input, heard: int) -> None:
+        """Keep strangers out of a crowded input, as long as an owner lives there."""
+        if source.crowd is None:
+            return
+        now = now_ns()
+        owners = {
+            gate.owner.address
+            for gate in (self.vehicle, self.sensor)
+            if gate.owner is not None and gate.owner.source == source.name and is_there(gate, now)
+        }
+        before = source.crowd.dropped
+        source.crowd.saw(heard, [_peer(name) for name in sorted(owners)], now)
+        if source.crowd.dropped > before:
+            self.counters["dropped_by_kernel"] += source.crowd.dropped - before
+
+    @property
+    def filters(self) -> dict[str, str]:
+        """What the kernel lets into each input, for people."""
+        return {one.name: one.crowd.filter for one in self.inputs if one.crowd is not None}
 
     def _decoded(self, source: Input, datagram: tuple[bytes, str, int]) -> VehicleMotion | None:
         data, address, arrival_ns = datagram

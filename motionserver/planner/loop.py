@@ -16,6 +16,7 @@ from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.intake.intake import Head, Intake
 from motionserver.core.kinematics.rotation import felt
 from motionserver.core.plan import pack
+from motionserver.core.safety.patient import time_of_check
 from motionserver.core.safety.states import CUED, State
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import STILL, Stimulus, VehicleMotion
@@ -29,9 +30,11 @@ from motionserver.planner.reply import status_packet
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
+from motionserver.planner.wake import next_wake
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
+from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Ticker, now_ns
@@ -67,6 +70,8 @@ class PlannerLoop:
         self._view = PlannerView()
         self._box = PlannerBox(run_dir)
         self._seldom = Seldom(log)
+        # a guard of short ticks needs some of them for its verdict
+        self._check_ns = int(time_of_check(options.send_period) * SECOND)
         self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None
@@ -81,10 +86,11 @@ class PlannerLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
-        self.scheduling = take_priority(30, self.options.realtime)
+        scheduling = take_priority(30, self.options.realtime)
+        self.scheduling = f"{scheduling}, {lock_memory(self.options.realtime)}"
         self._ticker = Ticker(self._wake)
         self._arm(now_ns())
-        log.info("planner ready: %s", self._thinker.tuning.algorithm)
+        log.info("planner ready: %s; %s", self._thinker.tuning.algorithm, self.scheduling)
         try:
             return await self._done
         finally:
@@ -113,9 +119,9 @@ class PlannerLoop:
         if clock is None:
             wake = max(self._due_ns + period, now)
         else:
-            wake = clock.due_ns - int(self.options.budget * SECOND)
-            earliest = max(now + 500_000, self._due_ns + period // 2)
-            wake += max(0, -(-(earliest - wake) // period)) * period
+            slot = int(self.options.send_period * SECOND)
+            first = clock.due_ns - int(self.options.budget * SECOND)
+            wake = next_wake(first, slot, self._due_ns + period, period, now)
         self._due_ns = wake
         if self._ticker is not None:
             self._ticker.arm(wake)
@@ -137,7 +143,7 @@ class PlannerLoop:
         if self._state not in CUED:
             stimulus = STILL
             self._intake.gain = 0.0
-        handover = self._clock.handover(now, self._timing.expected_ns)
+        handover = self._clock.handover(now, self._timing.expected_ns + self._check_ns)
         if handover is not None:
             self._think(now, handover, stimulus, sensor)
         self._serve(handover)

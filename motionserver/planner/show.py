@@ -175,6 +175,7 @@ class PlannerView:
                 "fresh": gate.is_fresh(now_ns),
                 "bad_share": round(gate.spoilage.share(now_ns), 3),
                 "last_error": (gate.plausibility.complaint() or inputs.last_error)[:300],
+                "filters": inputs.filters,
             },
             "solver": {
                 "backend": thinker.tuning.backend,

@@ -7,12 +7,12 @@ import socket
 import time
 from typing import Final
 
-DRAIN: Final = 64
-"""Datagrams read per tick."""
+DRAIN: Final = 96
+"""Datagrams read per tick: more than the buffer holds, so that the newest is among them."""
 LARGEST: Final = 2048
 """Bytes read of a datagram; what is longer is refused by its size."""
-BUFFER: Final = 65536
-"""Receive buffer [bytes]: small, because a full one drops the newest packet."""
+BUFFER: Final = 32768
+"""Receive buffer [bytes], 78 small datagrams, 28 of 1200 bytes: a full one drops the newest."""
 
 
 class UdpInput:
@@ -25,15 +25,15 @@ class UdpInput:
             OSError: The address is in use or not ours.
         """
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        self.socket = socket.socket(family, socket.SOCK_DGRAM)
+        self.socket.setblocking(False)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         try:
-            self._socket.bind((host, port))
+            self.socket.bind((host, port))
         except OSError:
-            self._socket.close()
+            self.socket.close()
             raise
-        self.address = self._socket.getsockname()[:2]
+        self.address = self.socket.getsockname()[:2]
         self._peers: dict[str, tuple[str, int]] = {}
 
     def drain(self) -> list[tuple[bytes, str, int]]:
@@ -41,7 +41,7 @@ class UdpInput:
         out: list[tuple[bytes, str, int]] = []
         for _ in range(DRAIN):
             try:
-                data, peer = self._socket.recvfrom(LARGEST)
+                data, peer = self.socket.recvfrom(LARGEST)
             except (BlockingIOError, ConnectionError):
                 break
             name = f"{peer[0]}:{peer[1]}"
@@ -56,8 +56,8 @@ class UdpInput:
         peer = self._peers.get(name)
         if peer is not None:
             with contextlib.suppress(OSError):
-                self._socket.sendto(data, peer)
+                self.socket.sendto(data, peer)
 
     def close(self) -> None:
         """Stop listening."""
-        self._socket.close()
+        self.socket.close()

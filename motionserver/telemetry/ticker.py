@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import ctypes
 import os
-import struct
 import time
 from collections.abc import Callable
 from typing import Final
@@ -31,6 +30,10 @@ class _Timer(ctypes.Structure):
     _fields_ = (("interval", _Timespec), ("value", _Timespec))
 
 
+_settime: Final = _libc.timerfd_settime
+_settime.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+
+
 class Ticker:
     """Calls back once per wake-up at absolute instants of CLOCK_MONOTONIC."""
 
@@ -39,18 +42,21 @@ class Ticker:
         self._descriptor = _libc.timerfd_create(_CLOCK_MONOTONIC, _NONBLOCK_CLOEXEC)
         if self._descriptor < 0:
             raise OSError(ctypes.get_errno(), "timerfd_create")
+        # made once: a structure and a pointer for every tick cost more than the call
+        self._timer = _Timer()
+        self._pointer = ctypes.byref(self._timer)
         asyncio.get_running_loop().add_reader(self._descriptor, self._wake)
 
     def arm(self, instant_ns: int) -> None:
         """Wake once at ``instant_ns``; at once if it has passed."""
-        instant = max(instant_ns, 1)
-        timer = _Timer(_Timespec(0, 0), _Timespec(*divmod(instant, 1_000_000_000)))
-        if _libc.timerfd_settime(self._descriptor, _ABSOLUTE, ctypes.byref(timer), None) < 0:
+        value = self._timer.value
+        value.seconds, value.nanoseconds = divmod(max(instant_ns, 1), 1_000_000_000)
+        if _settime(self._descriptor, _ABSOLUTE, self._pointer, None) < 0:
             raise OSError(ctypes.get_errno(), "timerfd_settime")
 
     def _wake(self) -> None:
         try:
-            struct.unpack("Q", os.read(self._descriptor, 8))
+            os.read(self._descriptor, 8)
         except BlockingIOError:
             return
         self._callback()

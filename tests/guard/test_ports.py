@@ -14,11 +14,13 @@ from motionserver.core.plan import pack, rest_at
 from motionserver.core.safety.given import GuardConfig
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
+from motionserver.guard import ports
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import DRAIN, Ports, open_link
 from motionserver.platforms.base import PlatformOptions
 from motionserver.settings.machine import load_machine
 from motionserver.telemetry.link import Maps, pack_cue
+from motionserver.telemetry.sieve import unsieve
 
 SLOT = struct.Struct("<QII")
 
@@ -29,7 +31,7 @@ class Scene:
         self.maps = Maps(folder, create=True)
         self.counters: Counter[str] = Counter()
         machine = load_machine("t2-compact")
-        options = GuardOptions(
+        self.options = GuardOptions(
             GuardConfig(machine, 1 / 60, 1 / 60),
             "moog-6dof2000e",
             PlatformOptions(length_offset=machine.leg_min),
@@ -39,7 +41,7 @@ class Scene:
             None,
             False,
         )
-        self.ports = Ports(options, folder, link, self.counters)
+        self.ports = Ports(self.options, folder, link, self.counters)
 
     def spoil(self, name: str, offset: int, data: bytes) -> None:
         with (self.folder / f"{name}.map").open("r+b") as file:
@@ -80,12 +82,39 @@ def test_feedback_is_the_platforms_alone(scene: Scene) -> None:
     }
 
 
-def test_a_flood_is_read_in_portions(scene: Scene) -> None:
+def test_a_flood_of_strangers_leaves_the_buffer_to_the_platform(scene: Scene) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-        for _ in range(3 * DRAIN):
+        for _ in range(10 * DRAIN):
             stranger.sendto(b"?", scene.link.getsockname())
-    scene.ports.feedback()
-    assert 0 < scene.counters["feedback_foreign"] <= DRAIN
+    scene.base.sendto(reply(), scene.link.getsockname())
+    assert len(scene.ports.feedback()) == 1
+    assert scene.counters["feedback_foreign"] == 10 * DRAIN
+    assert scene.ports.feedback() == ()
+    assert scene.counters["feedback_foreign"] == 10 * DRAIN
+
+
+def test_where_the_kernel_does_not_help_a_flood_is_read_in_portions(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unsieve(scene.link)
+    monkeypatch.setattr(ports, "DRAIN", 16)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        for _ in range(20):
+            stranger.sendto(b"?", scene.link.getsockname())
+    assert scene.ports.feedback() == ()
+    assert scene.counters["feedback_foreign"] == 16
+
+
+def test_a_refused_filter_is_told_and_the_guard_goes_on(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert scene.ports.filter == "127.0.0.1 alone"
+    monkeypatch.setattr(ports, "sieve", lambda *_: "the kernel refuses")
+    unsieve(scene.link)
+    other = Ports(scene.options, scene.folder, scene.link, scene.counters)
+    assert other.filter == "none: the kernel refuses"
+    scene.base.sendto(reply(), scene.link.getsockname())
+    assert len(other.feedback()) == 1
 
 
 def test_cues_are_read_once_and_nonsense_is_counted(scene: Scene) -> None:

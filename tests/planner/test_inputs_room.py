@@ -12,10 +12,12 @@ from motionserver.errors import ConfigError
 from motionserver.planner.inputs import MOST_SENDERS, SHOWN_ERRORS, Input, Inputs, open_input
 from motionserver.planner.inputs import log as room_log
 from motionserver.planner.options import InputOptions
+from motionserver.sources import udp as udp_module
 from motionserver.sources.beamng import BeamNgSource
-from motionserver.sources.udp import DRAIN, UdpInput
+from motionserver.sources.udp import UdpInput
 
 MS = 1_000_000
+DRAIN = 16
 MOTION = Motion((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -144,8 +146,9 @@ def udp() -> Callable[[], UdpInput]:
 
 
 def test_udp_is_drained_in_portions_and_answers_whom_it_heard(
-    udp: Callable[[], UdpInput],
+    udp: Callable[[], UdpInput], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(udp_module, "DRAIN", DRAIN)
     server = udp()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
         link.connect(tuple(server.address))
@@ -163,6 +166,17 @@ def test_udp_is_drained_in_portions_and_answers_whom_it_heard(
         link.send(b"again")
         server.drain()
         assert len(server._peers) == 1
+    server.close()
+
+
+def test_a_drain_empties_a_full_buffer(udp: Callable[[], UdpInput]) -> None:
+    server = udp()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        for size in (1, 200, 1200):
+            for _ in range(300):
+                link.sendto(bytes(size), tuple(server.address))
+            assert server.drain()
+            assert server.drain() == []
     server.close()
 
 

@@ -9,6 +9,7 @@ from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import rest_to_rest, straight_way, straight_ways
 from motionserver.core.plan import Plan, rest_at
 from motionserver.core.safety.shape import continues, well_formed
+from motionserver.core.safety.slices import Slices, whole
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.core.safety.verify import (
     AHEAD,
@@ -17,7 +18,7 @@ from motionserver.core.safety.verify import (
     LONGEST_MOVE,
     check_legs,
     check_ways_home,
-    judge,
+    judge_in_slices,
 )
 
 
@@ -36,6 +37,39 @@ def accept_proposal(
     Returns:
         The accepted plan, or why not.
     """
+    return whole(accept_in_slices(machine, plan, parent, clock, homes, None))
+
+
+def accept_in_slices(
+    machine: Machine,
+    plan: Plan,
+    parent: AcceptedPlan,
+    clock: float,
+    homes: Array,
+    block: int | None,
+) -> Slices[AcceptedPlan | Rejection]:
+    """`accept_proposal`, with rests between its parts and after every ``block`` samples.
+
+    Whoever lets time pass meanwhile must ask `untimely` again before the plan is played.
+    """
+    rejection = untimely(plan, parent, clock) or (
+        yield from judge_in_slices(
+            machine, plan, parent.plan, parent.before, GUARD_MARGINS, homes, block
+        )
+    )
+    if rejection is not None:
+        return rejection
+    return AcceptedPlan(plan, parent.plan, _home_bound(machine, plan.rest_pose, homes))
+
+
+def untimely(plan: Plan, parent: AcceptedPlan, clock: float) -> Rejection | None:
+    """Whether a proposal names another parent, or an instant that has passed or is far.
+
+    Args:
+        plan: The proposal.
+        parent: The newest accepted plan.
+        clock: The parent's own time now [s]; negative while it still waits for its instant.
+    """
     if plan.parent_id != parent.plan.plan_id or plan.plan_id == plan.parent_id:
         return Rejection(Reason.WRONG_PARENT)
     earliest = max(clock, CLOSEST if parent.before is not None else 0.0)
@@ -47,10 +81,7 @@ def accept_proposal(
         if not np.isfinite(plan.takeover):
             return Rejection(Reason.NOT_FINITE)
         return Rejection(Reason.TOO_EARLY, None, None, plan.takeover, clock + AHEAD)
-    rejection = judge(machine, plan, parent.plan, parent.before, GUARD_MARGINS, homes)
-    if rejection is not None:
-        return rejection
-    return AcceptedPlan(plan, parent.plan, _home_bound(machine, plan.rest_pose, homes))
+    return None
 
 
 def accept_rest(

@@ -8,16 +8,17 @@ from motionserver.core.axes import Array, frozen
 from motionserver.core.device import Order
 from motionserver.core.kinematics.forward import NoPoseError, forward
 from motionserver.core.kinematics.hexapod import leg_lengths, leg_motion
-from motionserver.core.motion.player import MOST_PENDING, Playback, advance, follow, state_now
+from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.plan import Plan
 from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
 from motionserver.core.safety.edges import edges
 from motionserver.core.safety.given import GuardConfig, TickInput
+from motionserver.core.safety.patient import PatientCheck, may_follow
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.states import CUED, RAISED, Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
-from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
+from motionserver.core.safety.verdict import AcceptedPlan, Rejection
 from motionserver.core.safety.watchdog import SECOND
 from motionserver.core.state import PlatformState
 
@@ -43,6 +44,11 @@ class Guard:
             config.plan_period,
             config.dry_run,
         )
+        self.judged: Plan | None = None
+        """The proposal that was decided about in the last tick."""
+        self._patient = (
+            PatientCheck(config.machine, self.homes, config.slices) if config.slices else None
+        )
         self._before: Playback | None = None
         self._unsent_ns = 0
         self._last = Setpoint(
@@ -63,8 +69,7 @@ class Guard:
         for feedback in given.feedback:
             supervisor.device.answered(feedback)
         supervisor.source.update(given.now_ns, given.cue)
-        if given.proposal is not None:
-            self._judge(given.proposal, given.now_ns)
+        self._judge(given)
         answers, wishes = edges(self.config, record, supervisor, given)
         followed = supervisor.step(record, given.now_ns, given.gap, wishes)
         if followed is not None:
@@ -72,6 +77,11 @@ class Guard:
         if not given.is_due:
             return None, answers
         return self._send(given.now_ns), answers
+
+    @property
+    def is_checking(self) -> bool:
+        """True while a proposal waits for the next slices of its check."""
+        return self._patient is not None and self._patient.is_busy
 
     def told(self, now_ns: int, is_sent: bool) -> None:
         """Learn what became of the setpoint of this tick.
@@ -99,25 +109,30 @@ class Guard:
             # by now the device has stopped by itself
             record.playback = None
 
-    def _judge(self, proposal: Plan, now_ns: int) -> None:
-        record, playback = self.record, self.record.playback
-        verdict: AcceptedPlan | Rejection
-        if record.state not in CUED or playback is None:
-            verdict = Rejection(Reason.NOT_CUEING)
-        elif len(playback.pending) >= MOST_PENDING:
-            verdict = Rejection(Reason.TOO_EARLY)
-        else:
-            verdict = accept_proposal(
-                self.machine, proposal, playback.newest, playback.newest_clock, self.homes
-            )
+    def _judge(self, given: TickInput) -> None:
+        """Decide about a proposal: at once, or over several ticks where those are short."""
+        record, playback, now = self.record, self.record.playback, given.now_ns
+        self.judged = given.proposal
+        verdict: AcceptedPlan | Rejection | None = None
+        if self._patient is not None:
+            if given.proposal is not None:
+                self._patient.offer(given.proposal)
+            self.judged, verdict = self._patient.tick(record.state, playback) or (None, None)
+            record.counters["plans_overtaken"] = self._patient.overtaken
+        elif given.proposal is not None:
+            verdict = may_follow(record.state, playback)
+            if playback is not None and verdict is None:
+                verdict = accept_proposal(
+                    self.machine, given.proposal, playback.newest, playback.newest_clock, self.homes
+                )
         if isinstance(verdict, Rejection):
             record.counters["plans_rejected"] += 1
             record.counters[f"rejected_{verdict.reason}"] += 1
-            record.rejections.append((now_ns, verdict))
-        else:
+            record.rejections.append((now, verdict))
+        elif verdict is not None:
             assert playback is not None
             record.playback = follow(playback, verdict)
-            record.accepted_ns = now_ns
+            record.accepted_ns = now
             record.counters["plans_accepted"] += 1
 
     def _enter(self, state: State, event: Event, now_ns: int) -> None:

@@ -21,6 +21,7 @@ class GuardConfig:
         engage: Who may engage: "console", "http" or "auto".
         patience: How long each silence is borne.
         dry_run: True: play everything, but send only the mode word, which moves nothing.
+        slices: Slices of a proposal's check per tick; 0 = the whole check in the tick it comes.
     """
 
     machine: Machine
@@ -29,6 +30,7 @@ class GuardConfig:
     engage: str = "console"
     patience: Patience = field(default_factory=Patience)
     dry_run: bool = False
+    slices: int = 0
 
 
 @dataclass(frozen=True, slots=True)

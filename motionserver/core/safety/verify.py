@@ -21,6 +21,7 @@ from motionserver.core.limits import Machine
 from motionserver.core.motion.moves import straight_ways
 from motionserver.core.plan import MAX_DURATION, Plan
 from motionserver.core.safety.shape import continues, well_formed
+from motionserver.core.safety.slices import Slices, blocks, whole
 from motionserver.core.safety.verdict import Reason, Rejection
 
 GRID: Final = 0.002
@@ -86,22 +87,49 @@ def judge(
         None if it may be played, else the first rule it breaks.
     """
     goals = machine.parked_pose[None] if homes is None else homes
-    return (
-        well_formed(plan, MAX_DURATION)
-        or continues(plan, parent)
-        or check_legs(machine, plan, parent, before, margins)
-        or check_ways_home(machine, plan.rest_pose, goals, margins)
-    )
+    return whole(judge_in_slices(machine, plan, parent, before, margins, goals, None))
+
+
+def judge_in_slices(
+    machine: Machine,
+    plan: Plan,
+    parent: Plan,
+    before: Plan | None,
+    margins: Margins,
+    homes: Array,
+    block: int | None,
+) -> Slices[Rejection | None]:
+    """`judge`, with rests between its parts and after every ``block`` samples; None is no rest."""
+    rejection = well_formed(plan, MAX_DURATION) or continues(plan, parent)
+    if rejection is not None:
+        return rejection
+    yield
+    rejection = yield from check_legs_in_slices(machine, plan, parent, before, margins, block)
+    if rejection is not None:
+        return rejection
+    yield
+    return check_ways_home(machine, plan.rest_pose, homes, margins)
 
 
 def check_legs(
     machine: Machine, plan: Plan, parent: Plan, before: Plan | None, margins: Margins
 ) -> Rejection | None:
     """Leg length, speed, acceleration, jerk on the grid; joints and the rest coarser."""
+    return whole(check_legs_in_slices(machine, plan, parent, before, margins, None))
+
+
+def check_legs_in_slices(
+    machine: Machine,
+    plan: Plan,
+    parent: Plan,
+    before: Plan | None,
+    margins: Margins,
+    block: int | None,
+) -> Slices[Rejection | None]:
+    """`check_legs`, with a rest after every ``block`` samples and every kind of limit."""
     # a long move is smooth: two thousand samples show it whole
     step = max(GRID, plan.duration / 2000.0)
-    poses, skipped = _samples(plan, parent, before, step)
-    legs = leg_lengths(machine, poses)
+    poses, legs, skipped = yield from _legs(machine, plan, parent, before, step, block)
 
     def at(row: int) -> float:
         return max(0.0, (row - skipped) * step)
@@ -124,7 +152,9 @@ def check_legs(
         size, spacing = np.abs(moved), step
         if order == 3 and limit * _DOUBTFUL < size.max() <= limit * share:
             # jerk changes between samples: seen from other instants it can be a third larger
-            size, spacing = _fine_jerk(machine, plan, parent, before, step / 2.0), step / 2.0
+            spacing = step / 2.0
+            _, fine, _ = yield from _legs(machine, plan, parent, before, spacing, block)
+            size = np.abs(np.diff(fine, 3, axis=0)) / spacing**3
         largest = float(size.max())
         if largest > limit * share:
             row, leg = np.unravel_index(int(size.argmax()), size.shape)
@@ -136,6 +166,7 @@ def check_legs(
         largest, allowed = float(size.max()), machine.passenger_acceleration * margins.share
         if largest > allowed:
             return Rejection(Reason.PASSENGER, at(int(size.argmax()) + 2), None, largest, allowed)
+    yield
     return _check_posture(machine, poses, margins, _POSTURE_EVERY, at)
 
 
@@ -166,18 +197,25 @@ def _check_posture(
     return None
 
 
-def _fine_jerk(
-    machine: Machine, plan: Plan, parent: Plan, before: Plan | None, step: float
-) -> Array:
-    poses, _ = _samples(plan, parent, before, step)
-    return np.abs(np.diff(leg_lengths(machine, poses), 3, axis=0)) / step**3
-
-
-def _samples(plan: Plan, parent: Plan, before: Plan | None, step: float) -> tuple[Array, int]:
-    """Poses on the grid, to three samples after the end; and how many of them lie before it."""
+def _legs(
+    machine: Machine, plan: Plan, parent: Plan, before: Plan | None, step: float, block: int | None
+) -> Slices[tuple[Array, Array, int]]:
+    """Poses and legs on the grid, to three samples after the end; how many lie before it."""
     times: Array = np.arange(int(np.ceil(plan.duration / step)) + 4, dtype=np.float64) * step
     lead = _played_before(plan, parent, before, step)
-    return np.concatenate((lead, plan.poses(times))), len(lead)
+    if block is None:
+        poses = np.concatenate((lead, plan.poses(times)))
+        return poses, leg_lengths(machine, poses), len(lead)
+    skipped = len(lead)
+    poses = np.empty((skipped + len(times), 6))
+    poses[:skipped] = lead
+    legs: Array = np.empty(poses.shape[::-1]).T
+    for begin, end in blocks(len(poses), block):
+        first = max(begin, skipped)
+        poses[first:end] = plan.poses(times[first - skipped : end - skipped])
+        legs[begin:end] = leg_lengths(machine, poses[begin:end])
+        yield
+    return poses, legs, skipped
 
 
 def _played_before(plan: Plan, parent: Plan, before: Plan | None, step: float) -> Array:

@@ -1,0 +1,128 @@
+"""A check of proposals that takes several ticks, for a guard whose tick is shorter than a check."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Final
+
+from motionserver.core.axes import Array
+from motionserver.core.limits import Machine
+from motionserver.core.motion.player import MOST_PENDING, Playback
+from motionserver.core.plan import Plan
+from motionserver.core.safety.accept import accept_in_slices, untimely
+from motionserver.core.safety.slices import Slices
+from motionserver.core.safety.states import CUED, State
+from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
+
+Verdict = AcceptedPlan | Rejection
+
+BLOCK: Final = 512
+"""Samples per slice: a tenth of a millisecond."""
+SHORT: Final = 0.003
+"""A guard with a tick shorter than this checks in slices [s]: a whole check takes up to 1 ms."""
+_PER_SLICE: Final = 0.0005
+_USUAL: Final = 8
+"""Slices of a check, but for one whose jerk is looked at twice."""
+
+
+def slices_per_tick(tick: float) -> int:
+    """Slices of a check that a tick of ``tick`` [s] has room for; 0 = the whole check."""
+    return 0 if tick >= SHORT else max(1, int(tick / _PER_SLICE + 1e-6))
+
+
+def time_of_check(tick: float) -> float:
+    """From a proposal's arrival to its verdict where ticks of ``tick`` [s] check in slices [s]."""
+    slices = slices_per_tick(tick)
+    return (ceil(_USUAL / slices) + 1) * tick if slices else 0.0
+
+
+def may_follow(state: State, playback: Playback | None) -> Rejection | None:
+    """Whether any proposal could be taken now."""
+    if state not in CUED or playback is None:
+        return Rejection(Reason.NOT_CUEING)
+    return Rejection(Reason.TOO_EARLY) if len(playback.pending) >= MOST_PENDING else None
+
+
+class PatientCheck:
+    """Checks one proposal at a time, some slices per tick; of those that wait the newest stays.
+
+    Args:
+        machine: Geometry and hard limits.
+        homes: Poses (H, 6) that must be reachable straight from a plan's rest pose.
+        slices: Most slices per tick.
+
+    Attributes:
+        overtaken: Proposals that a newer one replaced before their turn came.
+    """
+
+    def __init__(self, machine: Machine, homes: Array, slices: int) -> None:
+        self._machine, self._homes, self._slices = machine, homes, slices
+        self._waiting: Plan | None = None
+        self._parent: AcceptedPlan | None = None
+        self._plan: Plan | None = None
+        self._check: Slices[Verdict] | None = None
+        self.overtaken = 0
+
+    @property
+    def is_busy(self) -> bool:
+        """True while a proposal is being checked."""
+        return self._check is not None
+
+    def offer(self, proposal: Plan) -> None:
+        """Take a proposal; it waits for the one under way, and replaces one that waits."""
+        self.overtaken += self._waiting is not None
+        self._waiting = proposal
+
+    def tick(self, state: State, playback: Playback | None) -> tuple[Plan, Verdict] | None:
+        """Do the slices of one tick.
+
+        Args:
+            state: Motion state now.
+            playback: What is played now.
+
+        Returns:
+            A proposal and its verdict, as of now; None while none is ready.
+        """
+        if self._check is None:
+            if self._waiting is None:
+                return None
+            self._plan, self._waiting = self._waiting, None
+            refusal = may_follow(state, playback)
+            if refusal is not None or playback is None:
+                return self._plan, refusal or Rejection(Reason.NOT_CUEING)
+            self._parent = playback.newest
+            self._check = accept_in_slices(
+                self._machine,
+                self._plan,
+                playback.newest,
+                playback.newest_clock,
+                self._homes,
+                BLOCK,
+            )
+        # forgotten unless it rests: a check that raised is over
+        check, self._check = self._check, None
+        verdict = self._now(check, state, playback)
+        if verdict is None:
+            self._check = check
+            return None
+        assert self._plan is not None
+        return self._plan, verdict
+
+    def _now(
+        self, check: Slices[Verdict], state: State, playback: Playback | None
+    ) -> Verdict | None:
+        refusal = may_follow(state, playback)
+        if refusal is not None or playback is None:
+            return refusal
+        # by itself, not by its number: a guard that parks plays plans of its own
+        if playback.newest is not self._parent:
+            return Rejection(Reason.WRONG_PARENT)
+        try:
+            for _ in range(self._slices):
+                next(check)
+        except StopIteration as done:
+            verdict: Verdict = done.value
+            if isinstance(verdict, Rejection):
+                return verdict
+            return untimely(verdict.plan, playback.newest, playback.newest_clock) or verdict
+        return None
