@@ -122,7 +122,7 @@ def swap(tree: Tree) -> Finding:
     size, used = (sum(int(area[column]) for area in areas) / 2**20 for column in (2, 3))
     return Finding(
         name, Level.WARNING if used > 0 else Level.ADVICE, f"{used:.2f} of {size:.2f} GiB in use",
-        "no process locks its memory: a page on the disk costs a tick 10 ms and more",
+        "a page that is not locked may go to the disk; fetched back it costs a tick 10 ms and more",
         mends.SWAP,
     )  # fmt: skip
 

@@ -103,7 +103,7 @@ def realtime_throttle(tree: Tree) -> Finding:
 
 
 def memory_lock(tree: Tree) -> Finding:
-    """How much memory may be locked: the server locks none, so only swap makes it matter."""
+    """Whether guard and planner may lock their memory; without swap nothing depends on it."""
     name = "memory lock"
     limit, able = tree.limit("Max locked memory"), tree.may("CAP_IPC_LOCK")
     if limit is None or able is None:
@@ -113,12 +113,13 @@ def memory_lock(tree: Tree) -> Finding:
     found = f"mlockall {'allowed' if may else 'not allowed'}: RLIMIT_MEMLOCK {soft}, " + (
         f"CAP_IPC_LOCK {'yes' if able else 'no'}"
     )
-    means = "the server locks no memory, so without swap it does not matter"
     swapping = [line for line in (tree.lines("/proc/swaps") or [])[1:] if line.strip()]
+    if may:
+        return Finding(name, Level.OK, found, "guard and planner lock theirs: it stays in memory")
     if swapping:
         return Finding(
             name, Level.ADVICE, found,
-            "the server locks no memory: on a machine that swaps its pages may leave it",
+            "guard and planner cannot lock theirs: on a machine that swaps its pages may leave it",
             mends.SWAP,
         )  # fmt: skip
-    return Finding(name, Level.OK, found, means)
+    return Finding(name, Level.OK, found, "without swap it stays in memory unlocked too")

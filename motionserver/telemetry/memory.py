@@ -57,7 +57,8 @@ def _locked() -> int:
         text = Path("/proc/self/status").read_text("ascii", "replace")
     except OSError:
         return 0
-    return int(text.partition("VmLck:")[2].split()[0]) << 10
+    told = text.partition("VmLck:")[2].split()
+    return int(told[0]) << 10 if told else 0
 
 
 def _keep_heap(libc: ctypes.CDLL) -> None:

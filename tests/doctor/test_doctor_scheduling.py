@@ -115,7 +115,8 @@ SWAPS = "Filename Type Size Used Priority\n"
         ("unlimited", PLAIN, SWAPS, Level.OK, "mlockall allowed"),
         ("8388608", "CapEff:\t0000000000004000\n", SWAPS, Level.OK, "mlockall allowed"),
         ("8388608", PLAIN, SWAPS, Level.OK, "mlockall not allowed: RLIMIT_MEMLOCK 8.0 MiB"),
-        ("unlimited", PLAIN, SWAPS + "/dev/sda file 8 0 -2\n", Level.ADVICE, "mlockall allowed"),
+        ("unlimited", PLAIN, SWAPS + "/dev/sda file 8 0 -2\n", Level.OK, "mlockall allowed"),
+        ("8388608", PLAIN, SWAPS + "/dev/sda file 8 0 -2\n", Level.ADVICE, "mlockall not allowed"),
         ("8388608", "nothing", SWAPS, Level.UNKNOWN, "cannot be read"),
     ],
 )
