@@ -10,7 +10,6 @@ from own_kinematics import lengths, worst
 
 from motionserver.core.device import Order
 from motionserver.core.safety.states import State
-from motionserver.core.safety.supervisor import is_standing
 
 PERIOD = 1 / 60
 RETRACTED = 0.9022
@@ -30,10 +29,11 @@ class Account:
         self.judge = MoogJudge(config)
         self.at_base = MoogJudge(config, JudgedLimits(may_lose=True))
         self.wire_may_reorder = False
-        self.others_send = False
+        self.base_moves_itself = False
         self.wild = []
         self.states = []
-        self.asked = {}
+        self.refusals = []
+        self._granted_ns = -10 * SECOND
         self._stretches = []
         self._is_following = False
         self._followed = -1e9
@@ -72,29 +72,26 @@ class Account:
         self._ups.append(self.world.base.state is MachineState.ENGAGED)
         self._leds.append(self._followed)
 
-    def woken(self, before):
-        """The guard has ticked: which state it came from, and by whose edge."""
+    def woken(self, before, stood):
+        """The guard has ticked: which state it came from, whether it stood, by whose edge."""
         world, state = self.world, self.world.state
         if not self.states or self.states[-1][1] is not state:
             self.states.append((world.now, state))
-        granted = [m for _, m in world.requests["guard"].answers if m["ok"]]
-        world.requests["guard"].answers.clear()
+        answers = world.requests["guard"].answers
+        granted = any(answer["ok"] for _, answer in answers)
+        self.refusals += [answer["reason"] for _, answer in answers if not answer["ok"]]
+        answers.clear()
+        if granted:
+            self._granted_ns = world.now
         if state is before:
-            self._remember(granted)
             return
-        self._remember(granted)
-        if before in LATCHED:
-            asked = self.asked.get(State.PARKED, -10 * SECOND)
-            if world.now - asked > 2 * SECOND:
+        if before in LATCHED and state not in LATCHED:
+            if world.now - self._granted_ns > 2 * SECOND:
                 self.wild.append(f"{before} -> {state} without an operator's reset")
-            if not is_standing(world.record.playback):
+            if not stood:
                 self.wild.append(f"{before} -> {state} in motion")
         if before is State.PARKED and state is State.RAISING and not granted:
             self.wild.append("raised without an operator")
-
-    def _remember(self, granted):
-        if granted:
-            self.asked[State.PARKED] = self.world.now
 
     def problems(self):
         """Everything that was wrong so far."""
@@ -121,7 +118,7 @@ class Account:
         if np.abs(np.diff(legs, axis=0)).max() > self.config.leg_speed * STEP + 1e-9:
             out.append("the base's legs jumped")
         alone = np.array(self._instants) - np.array(self._leds) > LED
-        if (alone & np.array(self._ups) & (np.array(self._speeds) > STILL)).any():
+        if not self.base_moves_itself and (alone & np.array(self._ups) & (np.array(self._speeds) > STILL)).any():
             out.append("the base moved, led by nobody")
         return out
 

@@ -178,6 +178,7 @@ class Scene:
             over
             and world.state in LATCHED
             and is_standing(world.record.playback)
+            and world.base.is_at_rest
             and world.elapsed - self._asked > ASK_AGAIN
         ):
             self._asked = world.elapsed

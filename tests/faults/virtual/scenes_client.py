@@ -6,9 +6,11 @@ import zlib
 from dataclasses import replace
 
 from client import Client
-from motion_protocol import encode_cue
+from motion_protocol import Flags, Mode, encode_cue
 from motion_protocol.cue import CUE_LAYOUT
 from scenario import TICK, Fault
+
+from motionserver.core.axes import GRAVITY
 
 HEAD, SUM, VALUES = 40, 44, 48
 """Where a cue's checksum is, its payload begins, and the first acceleration stands."""
@@ -36,6 +38,12 @@ class ClientFault(Fault):
         super().__init__(world, rng)
         self.client = world.client
         self._before = 0
+        self._is_first = True
+
+    def is_wrong(self, share):
+        """Whether this packet is one of the wrong ones; the first always is."""
+        is_first, self._is_first = self._is_first, False
+        return self.rng.random() < share or is_first
 
     def counted(self):
         return sum(n for name, n in self.world.heard.items() if name.startswith(self.counter))
@@ -49,8 +57,8 @@ class ClientFault(Fault):
         return self.counted() > self._before
 
     def bound(self):
-        """A packet waits one planner period at most, the next wrong one a few intervals."""
-        return self.world.period + self.world.thinking + TICK + 30 * INTERVAL
+        """A wrong packet comes an interval later, and waits one planner period at most."""
+        return INTERVAL + self.world.period + self.world.thinking + 2 * TICK
 
 
 class Silence(ClientFault):
@@ -110,8 +118,7 @@ class F2(ClientFault):
         self.share = rng.choice((0.02, 0.5, 0.9))
         self.seconds = rng.uniform(1.3, 2.2)
         self.wrong = [struct.pack("<f", v) for v in (math.nan, math.inf, -math.inf)]
-        self.returns = True
-        self.stays = self.share < 0.1
+        self.returns = self.stays = self.share < 0.1
 
     def strike(self):
         self.client.spoil.append(self._spoil)
@@ -122,7 +129,7 @@ class F2(ClientFault):
         return replace(cue, motion=replace(cue.motion, rates=(1e-42, -1e-42, 1e-45)))
 
     def _spoil(self, data):
-        if self.rng.random() < self.share:
+        if self.is_wrong(self.share):
             return [forged(data, VALUES + 4 * self.rng.randrange(6), self.rng.choice(self.wrong))]
         return [data]
 
@@ -134,7 +141,7 @@ class F2(ClientFault):
         return super().reacted() if self.share < 0.1 else self.has_left_run
 
     def bound(self):
-        return 1.0 if self.share < 0.1 else 1.0 + STALE + self.world.period + 2 * TICK
+        return super().bound() if self.stays else 1.0 + STALE + self.world.period + 2 * TICK
 
 
 class F3(ClientFault):
@@ -149,6 +156,7 @@ class F3(ClientFault):
     def __init__(self, world, rng):
         super().__init__(world, rng)
         self.kind = rng.choice(("spike", "beyond", "teleport"))
+        self.seconds = rng.uniform(1.0, 3.0)
         self.size = rng.choice((-1, 1)) * rng.uniform(40.0, 90.0)
 
     def strike(self):
@@ -163,7 +171,10 @@ class F3(ClientFault):
         motion = cue.motion
         if self.kind == "teleport":
             return replace(cue, motion=replace(motion, speed=motion.speed + self.size))
-        if self.rng.random() < 0.8:
+        # only the newest packet of a period is felt: a spike lasts a few
+        if self.is_wrong(0.01):
+            self._until_ns = self.world.now + 40_000_000
+        if self.world.now > self._until_ns:
             return cue
         size = self.size * (4.0 if self.kind == "beyond" else 1.0)
         return replace(cue, motion=replace(motion, acceleration=(size, -size, motion.acceleration[2])))
@@ -181,35 +192,49 @@ class F4(ClientFault):
     number = 4
     title = "wrong size, magic, version, byte order"
     detection = "length, magic, version, checksum, range"
-    reaction = "dropped and counted; the drive goes on"
+    reaction = "dropped and counted; more than 10 % of the owner's over 1 s: HOLD"
     recovery = "automatic"
     counter = "refused"
-    stays = True
+
+    def __init__(self, world, rng):
+        super().__init__(world, rng)
+        self.kind = rng.choice(("stranger", "few", "many"))
+        self.seconds = rng.uniform(1.3, 2.2)
+        self.share = {"stranger": 0.9, "few": 0.04, "many": 0.6}[self.kind]
+        self.returns = self.stays = self.kind != "many"
 
     def strike(self):
         self.client.spoil.append(self._spoil)
 
     def _spoil(self, data):
         rng = self.rng
+        if not self.is_wrong(self.share):
+            return [data]
         swapped = b"".join(data[i : i + 4][::-1] for i in range(VALUES, VALUES + 24, 4))
-        huge = struct.pack(">f", 1e-3) * 3
-        wrong = [
-            data[: rng.randrange(len(data))],
-            data + bytes(rng.randrange(1, 400)),
-            data[:4][::-1] + data[4:],
-            data[:4] + bytes([9]) + data[5:],
-            data[:50] + bytes([data[50] ^ 1]) + data[51:],
-            rng.randbytes(rng.randrange(0, 200)),
-            forged(data, VALUES, swapped),
-            forged(data, VALUES, huge),
-        ]
-        return [data, rng.choice(wrong[:6])] if rng.random() < 0.7 else [data, self._as_is(wrong)]
-
-    def _as_is(self, wrong):
-        return self.rng.choice(wrong[6:])
+        wrong = rng.choice(
+            (
+                data[: rng.randrange(len(data))],
+                data + bytes(rng.randrange(1, 400)),
+                data[:4][::-1] + data[4:],
+                data[:4] + bytes([9]) + data[5:],
+                data[:50] + bytes([data[50] ^ 1]) + data[51:],
+                rng.randbytes(rng.randrange(0, 200)),
+                forged(data, VALUES, swapped),
+            )
+        )
+        if self.kind == "stranger":
+            self.world.way.put(wrong, "198.51.100.4:7")
+            return [data]
+        return [wrong]
 
     def relent(self):
         self.client.spoil.remove(self._spoil)
+
+    def reacted(self):
+        return self.has_left_run if self.kind == "many" else super().reacted()
+
+    def bound(self):
+        return super().bound() if self.stays else 1.0 + STALE + self.world.period + 2 * TICK
 
 
 class F5(ClientFault):
@@ -229,7 +254,7 @@ class F5(ClientFault):
         self.client.spoil.append(self._replay)
 
     def _replay(self, data):
-        return [data, self.rng.choice(self.former)] if self.rng.random() < 0.3 else [data]
+        return [data, self.rng.choice(self.former)] if self.is_wrong(0.3) else [data]
 
     def relent(self):
         self.client.spoil.remove(self._replay)
@@ -381,30 +406,54 @@ class F34(Silence):
 class F35(ClientFault):
     number = 35
     title = "wrong units: degrees for radians, g for m/s2"
-    detection = "range gate; a plausibility over 10 s is missing"
-    reaction = "warn, refuse to engage"
-    recovery = "none needed"
+    detection = "median of force and rate over 10 s"
+    reaction = "told; engaging is refused"
+    recovery = "a client with other units"
     from_start = True
-    open = "nothing compares the values with what a vehicle does"
-    counter = "refused_out_of_range"
 
     def __init__(self, world, rng):
         super().__init__(world, rng)
-        self.seconds = 1.0
-        self.kind = rng.choice(("degrees", "g twice"))
+        self.seconds = 6.5
+        self.kind = rng.choice(("degrees", "g"))
 
     def strike(self):
+        self.client.alter.append(self._alter)
+        # five seconds are needed to tell, the guard a while to be parked
+        self.world.after(6.0, self._ask)
+
+    def _ask(self):
+        self._asked_ns = self.world.now
+        self._count = len(self.world.account.refusals)
+        self.world.ask("engage")
+
+    def _alter(self, cue):
+        motion = cue.motion
         if self.kind == "degrees":
-            change = self.client.moving(rates=lambda r: tuple(math.degrees(v) for v in r))
-        else:
-            change = self.client.moving(acceleration=lambda a: tuple(9.81 * v for v in a))
-        self.client.alter.append(change)
+            wrong = tuple(math.degrees(3.0 * rate) for rate in motion.rates)
+            return replace(cue, motion=replace(motion, rates=wrong))
+        ax, ay, az = motion.acceleration
+        in_g = (ax / GRAVITY, ay / GRAVITY, az / GRAVITY + 1.0)
+        motion = replace(motion, acceleration=in_g)
+        return replace(cue, motion=motion, flags=Flags.GRAVITY_INCLUDED)
+
+    def relent(self):
+        """The client goes and comes back mended."""
+        self.client.alter.clear()
+        self.client.mode = Mode.BYE
+        self.client.send()
+        self.client.mode, self.client.session, self.client.sequence = Mode.DRIVE, 9, 0
+
+    def onset_ns(self):
+        return self._asked_ns
 
     def reacted(self):
-        return any(not m["ok"] for _, m in self.world.requests["guard"].answers)
+        # a refusal lasts: what is looked at is the answer to the edge
+        return self.world.now > getattr(self, "_asked_ns", 1 << 62) and (
+            len(self.world.account.refusals) > self._count
+        )
 
     def bound(self):
-        return 10.0
+        return 2 * TICK
 
 
 SCENES = (F1, F2, F3, F4, F5, F6, F7, F8, F9, F32, F34, F35)

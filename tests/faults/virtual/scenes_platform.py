@@ -1,9 +1,12 @@
 """Faults of the base and of the way to it: F10 to F13, F25, F31, F36."""
 
+import struct
+
 import numpy as np
 from fittings import BASE
 from motion_clients.flawed_link import LinkFlaws
-from motion_clients.moog_wire import Command, Fault as Bit, Mcw, decode_command, encode_command
+from motion_clients.moog_wire import Fault as Bit
+from motion_clients.moog_wire import Mcw, decode_command
 from scenario import SEND, TICK, Fault
 
 from motionserver.core.device import Order
@@ -140,6 +143,8 @@ class F13(PlatformFault):
         self._beyond_ns = None
 
     def strike(self):
+        # freed, it hurries to where it should have been
+        self.world.account.base_moves_itself = True
         self.world.base.stick_leg(self.leg)
         self.world.client.alter.append(
             self.world.client.moving(acceleration=lambda a: (a[0] + 4.0, a[1] + 2.0, a[2]))
@@ -280,7 +285,7 @@ class F36(PlatformFault):
             world.hear(bytes(39), BASE)
         else:
             world.base.advance(world.seconds)
-            world.base.receive(encode_command(Command(word, words)), world.seconds)
+            world.base.receive(struct.pack(">I6fI", word, *words, 0), world.seconds)
         world.after(SEND, self._other)
 
     def relent(self):

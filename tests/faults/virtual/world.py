@@ -22,6 +22,7 @@ from motion_clients.moog_device import MoogDevice
 from motionserver.core.axes import frozen
 from motionserver.core.safety.given import GuardConfig
 from motionserver.core.safety.states import State
+from motionserver.core.safety.supervisor import is_standing
 from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import GuardOptions
 from motionserver.planner.loop import PlannerLoop
@@ -183,9 +184,9 @@ class World:
         if self.now < self.guard_sleeps_until:
             self.at(self.guard_sleeps_until, lambda: self._wake_guard(mine))
             return
-        before = self.state
+        before, stood = self.state, is_standing(self.record.playback)
         self.guard._wake()
-        self.account.woken(before)
+        self.account.woken(before, stood)
         for watcher in self.watchers:
             watcher()
 
