@@ -113,6 +113,7 @@ class Scene:
         self.world = World(seed, planner_hz, algorithm, **setup)
         self.classes, self.seed, self.seconds, self.calm = faults, seed, seconds, calm
         self.problems, self._asked, self._ran_ns = [], -1e9, 0
+        self.is_hasty = False
 
     def play(self):
         world = self.world
@@ -178,7 +179,7 @@ class Scene:
             over
             and world.state in LATCHED
             and is_standing(world.record.playback)
-            and world.base.is_at_rest
+            and (self.is_hasty or world.base.is_at_rest)
             and world.elapsed - self._asked > ASK_AGAIN
         ):
             self._asked = world.elapsed

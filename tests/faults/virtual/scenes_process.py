@@ -8,6 +8,7 @@ import pytest
 from fittings import Slot
 from scenario import SEND, TICK, Fault
 
+from motionserver.core.device import Order
 from motionserver.core.safety.act import REACH
 from motionserver.core.safety.states import RAISED, State
 from motionserver.errors import ConfigError
@@ -191,7 +192,8 @@ class F24(Fault):
 
     def look(self):
         world = self.world
-        if self.is_over and self._off is None and world.state is State.PARKING:
+        follows = world.encoded.order is Order.FOLLOW
+        if self.is_over and self._off is None and follows and world.state is State.PARKING:
             measured = world.base.legs.extensions
             legs = world.encoded.legs - 0.9022
             self._off = max(abs(a - b) for a, b in zip(legs, measured, strict=True))

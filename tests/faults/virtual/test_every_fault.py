@@ -1,0 +1,100 @@
+"""Every fault of the list with three seeds: soft, in time, and ended safe."""
+
+import pytest
+from account import Account
+from fault_pairs import pairs_of
+from faults import FAULTS
+from fittings import fitted
+from scenario import Scene
+from table import markdown
+from world import World
+
+from motionserver.core.safety.states import State
+
+SECONDS = 20.0
+SEEDS = (1, 2, 3)
+WITH_MPC = (1, 10, 13, 21, 31)
+"""Faults whose third seed is driven by the six-axis MPC at the rate of the shipped configuration."""
+
+
+def scene(number, seed, **more):
+    """The cheapest algorithm for most, the shipped one for a few."""
+    shipped = number in WITH_MPC and seed == SEEDS[-1]
+    more = {"planner_hz": 60.0, "algorithm": "mpc" if shipped else "classical"} | more
+    return Scene([FAULTS[number]], seed, SECONDS, **more)
+
+
+def judged(outcome):
+    assert outcome.problems == [], outcome.states
+    assert outcome.violations == 0
+    assert outcome.late == [], outcome.states
+
+
+def test_the_list_is_whole():
+    assert sorted(FAULTS) == list(range(1, 37))
+    for number, cls in FAULTS.items():
+        assert cls.__name__ == f"F{number}"
+        assert all((cls.title, cls.detection, cls.reaction, cls.recovery))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("number", sorted(FAULTS), ids=lambda n: f"F{n}")
+def test_a_fault_is_answered_softly_and_in_time(number, seed):
+    played = scene(number, seed)
+    outcome = played.play()
+    judged(outcome)
+    if getattr(FAULTS[number], "is_unseen", False):
+        assert outcome.digest == scene(number, seed, calm=True).play().digest
+
+
+def test_a_scene_is_the_same_again_to_the_byte():
+    first, second = (scene(13, 5).play() for _ in range(2))
+    assert first == second
+
+
+@pytest.mark.parametrize("two", pairs_of(seed=1, count=4), ids=lambda t: f"F{t[0]}-F{t[1]}")
+def test_two_faults_at_once(two):
+    outcome = Scene([FAULTS[n] for n in two], 1, SECONDS).play()
+    assert outcome.problems == [], outcome.states
+    assert outcome.violations == 0
+
+
+def test_the_account_convicts_a_jump():
+    """What judges is itself judged: a setpoint that jumps is seen by both."""
+    world = World(1)
+    with fitted(world):
+        world.start()
+        world.engage()
+        assert world.account.problems() == []
+        inner = world.account.sent
+
+        def jumping(data, setpoint):
+            Account.sent(world.account, data, setpoint)
+            world.account.sent = inner
+            pose = setpoint.state.pose.copy()
+            pose[0] += 0.02
+            world.account._stretches[-1][-1] = (pose, setpoint.legs)
+
+        world.account.sent = jumping
+        world.run(0.2)
+        assert world.state is State.RUN
+        assert any("other kinematics" in text for text in world.account.problems())
+
+
+@pytest.mark.xfail(reason="a reset is granted while the base still moves: its first setpoint jumps")
+def test_a_hasty_reset_after_the_platform_did_not_follow():
+    played = Scene([FAULTS[13]], 1, SECONDS)
+    played.is_hasty = True
+    judged(played.play())
+
+
+def test_the_table_tells_figures():
+    outcome = {
+        "names": ["F10"],
+        "took": {"F10": 0.1},
+        "bounds": {"F10": 0.125},
+        "violations": 0,
+    }
+    text = markdown([outcome])
+    assert "| F10 platform silent |" in text
+    assert "| 125 ms | 100 ms | 100 ms | 1 | 0 |" in text
