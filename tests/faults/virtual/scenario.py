@@ -30,7 +30,7 @@ class Fault:
         stays: The platform must go on running throughout.
         returns: It must run again by itself when the fault has gone.
         from_start: It is there before the server starts.
-        open: What is known to be missing in the product; then the reaction is expected to fail.
+        open: Why the product is known to disturb the drive although it should not; noted only.
     """
 
     number = 0
@@ -113,7 +113,7 @@ class Scene:
         self.world = World(seed, planner_hz, algorithm, **setup)
         self.classes, self.seed, self.seconds, self.calm = faults, seed, seconds, calm
         self.problems, self._asked, self._ran_ns = [], -1e9, 0
-        self.is_hasty = False
+        self.is_hasty, self.notes = False, []
 
     def play(self):
         world = self.world
@@ -165,7 +165,8 @@ class Scene:
             if self.calm:
                 continue
             if fault.stays and len(self.faults) == 1 and self._left_run():
-                self.problems.append(f"{fault.name} disturbed the drive: {world.record.reason}")
+                where = self.notes if fault.open else self.problems
+                where.append(f"{fault.name} disturbed the drive: {world.record.events}")
             if fault.returns and len(self.faults) == 1 and world.state is not State.RUN:
                 self.problems.append(f"{fault.name}: {world.state} instead of RUN again")
 
@@ -230,6 +231,7 @@ class Scene:
             [(round((at - world.began) * 1e-9, 3), s.value) for at, s in world.account.states],
             world.digest(),
             world.elapsed,
+            self.notes,
         )
 
 

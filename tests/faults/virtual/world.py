@@ -216,6 +216,12 @@ class World:
         if len(self._answers) < 32:
             self._answers.append((data, peer))
 
+    def setsockopt(self, *_):
+        """No kernel, no filter."""
+
+    def getsockopt(self, *_):
+        raise OSError(errno.ENOPROTOOPT, "no kernel")
+
     def recvfrom(self, _):
         if self.link_trouble is not None:
             raise self.link_trouble
