@@ -49,7 +49,8 @@ class Account:
         follows = command.mcw == Mcw.NEW_POSITION
         if follows is not (setpoint.order is Order.FOLLOW):
             self.wild.append(f"{setpoint.order} went out as {command.mcw}")
-        off = max(abs(w + RETRACTED - l) for w, l in zip(command.words, setpoint.legs, strict=True))
+        pairs = zip(command.words, setpoint.legs, strict=True)
+        off = max(abs(word + RETRACTED - leg) for word, leg in pairs)
         if off > 1e-6:
             self.wild.append(f"words are {off:.2e} m off their setpoint")
         if follows and not self._is_following:
@@ -118,7 +119,10 @@ class Account:
         if np.abs(np.diff(legs, axis=0)).max() > self.config.leg_speed * STEP + 1e-9:
             out.append("the base's legs jumped")
         alone = np.array(self._instants) - np.array(self._leds) > LED
-        if not self.base_moves_itself and (alone & np.array(self._ups) & (np.array(self._speeds) > STILL)).any():
+        if (
+            not self.base_moves_itself
+            and (alone & np.array(self._ups) & (np.array(self._speeds) > STILL)).any()
+        ):
             out.append("the base moved, led by nobody")
         return out
 

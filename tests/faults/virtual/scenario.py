@@ -3,6 +3,7 @@
 import statistics
 from dataclasses import dataclass, field
 from random import Random
+from typing import ClassVar
 
 from fittings import SECOND, fitted
 from world import SEND_HZ, World
@@ -16,6 +17,8 @@ CLOSING = 8.5
 """Long enough to come to rest, go home and settle [s]."""
 EXTRA = 15.0
 """How long after its time a scene is waited for, before it counts as never ended [s]."""
+LEAST = 2.0
+"""A brief scene runs at least so long [s]."""
 STEP = 0.1
 ASK_AGAIN = 2.5
 LATCHED = (State.FAULT, State.SAFE)
@@ -35,7 +38,7 @@ class Fault:
 
     number = 0
     title = detection = reaction = recovery = ""
-    setup = {}
+    setup: ClassVar[dict] = {}
     stays = returns = from_start = False
     open = ""
 
@@ -106,14 +109,23 @@ class Outcome:
 class Scene:
     """One world in which some faults happen."""
 
-    def __init__(self, faults, seed, seconds, planner_hz=60.0, algorithm="classical", calm=False):
-        setup = {}
+    def __init__(
+        self,
+        faults,
+        seed,
+        seconds,
+        planner_hz=60.0,
+        algorithm="classical",
+        calm=False,
+        is_brief=False,
+    ):
+        setup: ClassVar[dict] = {}
         for cls in faults:
             setup |= cls.setup
         self.world = World(seed, planner_hz, algorithm, **setup)
         self.classes, self.seed, self.seconds, self.calm = faults, seed, seconds, calm
         self.problems, self._asked, self._ran_ns = [], -1e9, 0
-        self.is_hasty, self.notes = False, []
+        self.is_hasty, self.is_brief, self.notes = False, is_brief, []
 
     def play(self):
         world = self.world
@@ -161,6 +173,8 @@ class Scene:
             self._operate()
             if world.guard._done.done():
                 return
+            if self.is_brief and self._goes_on():
+                break
         for fault in self.faults:
             if self.calm:
                 continue
@@ -170,8 +184,18 @@ class Scene:
             if fault.returns and len(self.faults) == 1 and world.state is not State.RUN:
                 self.problems.append(f"{fault.name}: {world.state} instead of RUN again")
 
+    def _goes_on(self):
+        """Everything is over, and it has run again for a while: nothing more will come."""
+        world = self.world
+        begun = self._ran_ns + int(LEAST * SECOND)
+        over = all(fault.is_over for fault in self.faults) and not self.calm
+        at, state = world.account.states[-1]
+        return over and state is State.RUN and world.now - max(at, begun) > SECOND
+
     def _left_run(self):
-        return [s for at, s in self.world.account.states if at > self._ran_ns and s is not State.RUN]
+        return [
+            s for at, s in self.world.account.states if at > self._ran_ns and s is not State.RUN
+        ]
 
     def _operate(self):
         world = self.world

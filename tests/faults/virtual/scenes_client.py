@@ -4,6 +4,7 @@ import math
 import struct
 import zlib
 from dataclasses import replace
+from typing import ClassVar
 
 from client import Client
 from motion_protocol import Flags, Mode, encode_cue
@@ -172,12 +173,14 @@ class F3(ClientFault):
         if self.kind == "teleport":
             return replace(cue, motion=replace(motion, speed=motion.speed + self.size))
         # only the newest packet of a period is felt: a spike lasts a few
-        if self.is_wrong(0.01):
+        if self.is_wrong(0.0 if self.kind == "beyond" else 0.01):
             self._until_ns = self.world.now + 40_000_000
         if self.world.now > self._until_ns:
             return cue
         size = self.size * (4.0 if self.kind == "beyond" else 1.0)
-        return replace(cue, motion=replace(motion, acceleration=(size, -size, motion.acceleration[2])))
+        return replace(
+            cue, motion=replace(motion, acceleration=(size, -size, motion.acceleration[2]))
+        )
 
     def relent(self):
         self.client.alter.remove(self._alter)
@@ -316,7 +319,7 @@ class F8(ClientFault):
     detection = "signature of every packet"
     reaction = "dropped and counted; the drive goes on"
     recovery = "none needed"
-    setup = {"key": KEY}
+    setup: ClassVar[dict] = {"key": KEY}
     counter = "refused_hmac"
     stays = True
 
@@ -366,7 +369,7 @@ class F32(F1):
     number = 32
     title = "Zenoh router restarts, network is parted"
     detection = "age of the newest packet, never Zenoh's liveliness"
-    setup = {"kind": "zenoh"}
+    setup: ClassVar[dict] = {"kind": "zenoh"}
 
     def strike(self):
         Silence.strike(self)

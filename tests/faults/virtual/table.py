@@ -31,9 +31,7 @@ def rows(outcomes):
         if getattr(cls, "is_unseen", False):
             figures = ("none", "none", "none")
         elif took:
-            figures = tuple(
-                f"{v:.0f} ms" for v in (max(bound), statistics.median(took), max(took))
-            )
+            figures = tuple(f"{v:.0f} ms" for v in (max(bound), statistics.median(took), max(took)))
         cells = (
             f"F{number} {cls.title}",
             cls.detection,

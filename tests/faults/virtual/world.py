@@ -13,7 +13,18 @@ from random import Random
 import numpy as np
 from account import Account
 from client import Client
-from fittings import BASE, NOWHERE, SECOND, Alarm, Collector, Done, Files, Requests, UdpWay, ZenohWay
+from fittings import (
+    BASE,
+    NOWHERE,
+    SECOND,
+    Alarm,
+    Collector,
+    Done,
+    Files,
+    Requests,
+    UdpWay,
+    ZenohWay,
+)
 from machines import compact
 from motion_clients.flawed_link import FlawedLink
 from motion_clients.moog_config import MoogConfig
