@@ -132,7 +132,7 @@ class Scene:
         with fitted(world) as patch:
             world.patch = patch
             self.faults = [
-                cls(world, Random(1000 * self.seed + cls.number)) for cls in self.classes
+                cls(world, Random(f"{self.seed} {cls.number}")) for cls in self.classes
             ]
             if not self.calm:
                 world.watchers += [fault.look for fault in self.faults]
