@@ -131,9 +131,7 @@ class Scene:
         world = self.world
         with fitted(world) as patch:
             world.patch = patch
-            self.faults = [
-                cls(world, Random(f"{self.seed} {cls.number}")) for cls in self.classes
-            ]
+            self.faults = [cls(world, Random(f"{self.seed} {cls.number}")) for cls in self.classes]
             if not self.calm:
                 world.watchers += [fault.look for fault in self.faults]
             self._begin()
