@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from threading import Event
+from time import sleep
 from typing import Any, Final
 
 from motionserver.evaluate.bench.latency import punctual
@@ -20,7 +23,7 @@ FLOOD_HZ: Final = 100_000.0
 RATE_HZ: Final = 60.0
 """Of the platform: the guard ticks at 240 Hz."""
 _ARRIVAL: Final = 0.3
-"""Cues after the flood, so that the last snapshot holds all of it [s]."""
+"""Wait after the flood, so that the last snapshot holds all of it [s]."""
 
 
 def bench_flood(seconds: float, realtime: bool = True) -> list[Row]:
@@ -37,8 +40,8 @@ def bench_flood(seconds: float, realtime: bool = True) -> list[Row]:
     rows: list[Row] = []
     with BenchServer(RATE_HZ, realtime, key) as server:
         sender = StepSender(server.cue_port, key=key)
-        with punctual():
-            _engage(server, sender)
+        with _sending(sender):
+            server.engage()
             for name, port in (
                 ("idle", 0),
                 ("cue port flooded", server.cue_port),
@@ -52,13 +55,23 @@ def bench_flood(seconds: float, realtime: bool = True) -> list[Row]:
     return rows
 
 
-def _engage(server: BenchServer, sender: StepSender) -> None:
+@contextmanager
+def _sending(sender: StepSender) -> Iterator[None]:
+    """The client is never silent, whatever is started or waited for meanwhile."""
+    ended = Event()
+
+    def go_on() -> None:
+        with punctual():
+            while not ended.is_set():
+                sender.hold(0.1)
+
     with ThreadPoolExecutor(1) as aside:
-        engaging = aside.submit(server.engage)
-        while not engaging.done():
-            sender.hold(0.1)
-        engaging.result()
-    sender.hold(1.0)
+        going = aside.submit(go_on)
+        try:
+            yield
+        finally:
+            ended.set()
+        going.result()
 
 
 def _stretch(
@@ -74,10 +87,10 @@ def _stretch(
         if port:
             words = (str(port), str(FLOOD_HZ), str(seconds))
             strangers = stack.enter_context(Helper("motionserver.evaluate.bench.flooder", *words))
-        sender.hold(seconds)
+        sleep(seconds)
         during = server.planner()["source"]
         flooded = {} if strangers is None else strangers.result()
-        sender.hold(_ARRIVAL)
+        sleep(_ARRIVAL)
         after = server.guard(), server.planner()
         sentinel = beside.row(f"  sentinel {tick_hz:.0f} Hz")
     if before[1]["pid"] != after[1]["pid"] or before[0]["pid"] != after[0]["pid"]:
