@@ -182,9 +182,8 @@ def test_the_newest_waits_and_the_one_under_way_ends_first():
     first, second, third = (proposal(plan_id=number) for number in (2, 3, 4))
     check.offer(first)
     check.tick(State.RUN, standing())
-    check.offer(second)
-    check.offer(third)
-    assert check.overtaken == 1
+    assert not check.offer(second)
+    assert check.offer(third)
     order = []
     for _ in range(40):
         found = check.tick(State.RUN, standing())
