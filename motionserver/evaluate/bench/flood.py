@@ -101,7 +101,7 @@ def _stretch(
         notes["dropped in the kernel"] = _more(before[1], after[1], "dropped_by_kernel") + _more(
             before[0], after[0], "feedback_foreign"
         )
-        notes["filter"] = next(iter(during["filters"].values()))
+        notes["filter"] = next(iter(during["filters"].values()), "none")
     # what a snapshot counts was sent before it; one packet at either end may be under way
     begin, end = before[1]["t_ns"], after[1]["t_ns"]
     sent = sum(begin < at <= end for at in sender.sent_ns)
