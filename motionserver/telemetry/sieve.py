@@ -45,7 +45,10 @@ def sieve(link: socket.socket, peers: Sequence[Peer], least: int = 0, most: int 
     Returns:
         "" if the kernel does it, else why not.
     """
-    program = sieve_program(peers, least, most)
+    try:
+        program = sieve_program(peers, least, most)
+    except ValueError as error:
+        return str(error)
     code = b"".join(struct.pack("HBBI", *line) for line in program)
     buffer = ctypes.create_string_buffer(code, len(code))
     return _ask(link, _ATTACH, struct.pack("HP", len(program), ctypes.addressof(buffer)))

@@ -107,6 +107,19 @@ def test_in_a_flood_the_owner_loses_nothing_once_it_is_seen(scene: Scene) -> Non
     assert scene.inputs.counters["dropped_by_kernel"] > 40 * 200
 
 
+def test_what_the_kernel_drops_keeps_the_door_shut(scene: Scene) -> None:
+    scene.say()
+    assert scene.poll() == 1
+    scene.crowd_in()
+    shut = scene.filter
+    for _ in range(12):
+        scene.ahead += CALM_NS // 4
+        scene.flood()
+        scene.say()
+        scene.poll()
+        assert scene.filter == shut
+
+
 def test_without_an_owner_impossible_lengths_are_kept_out(scene: Scene) -> None:
     scene.crowd_in(b"short")
     assert scene.filter == "crowd: all let in"

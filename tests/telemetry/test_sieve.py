@@ -114,6 +114,7 @@ def test_a_refusal_is_told_and_nothing_raises() -> None:
         assert "refuses" in unsieve(link)
         many = [(V4, port) for port in range(1, 2000)]
         assert "refuses" in sieve(link, many)
+        assert "localhost" in sieve(link, [("localhost", 1)])
     assert dropped(link) == 0
 
 

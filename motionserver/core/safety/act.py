@@ -115,10 +115,9 @@ class Guard:
         self.judged = given.proposal
         verdict: AcceptedPlan | Rejection | None = None
         if self._patient is not None:
-            if given.proposal is not None:
-                self._patient.offer(given.proposal)
+            if given.proposal is not None and self._patient.offer(given.proposal):
+                record.counters["plans_overtaken"] += 1
             self.judged, verdict = self._patient.tick(record.state, playback) or (None, None)
-            record.counters["plans_overtaken"] = self._patient.overtaken
         elif given.proposal is not None:
             verdict = may_follow(record.state, playback)
             if playback is not None and verdict is None:

@@ -50,9 +50,6 @@ class PatientCheck:
         machine: Geometry and hard limits.
         homes: Poses (H, 6) that must be reachable straight from a plan's rest pose.
         slices: Most slices per tick.
-
-    Attributes:
-        overtaken: Proposals that a newer one replaced before their turn came.
     """
 
     def __init__(self, machine: Machine, homes: Array, slices: int) -> None:
@@ -61,17 +58,17 @@ class PatientCheck:
         self._parent: AcceptedPlan | None = None
         self._plan: Plan | None = None
         self._check: Slices[Verdict] | None = None
-        self.overtaken = 0
 
     @property
     def is_busy(self) -> bool:
         """True while a proposal is being checked."""
         return self._check is not None
 
-    def offer(self, proposal: Plan) -> None:
-        """Take a proposal; it waits for the one under way, and replaces one that waits."""
-        self.overtaken += self._waiting is not None
+    def offer(self, proposal: Plan) -> bool:
+        """Take a proposal; it waits for the one under way. True if it replaced one that waited."""
+        has_overtaken = self._waiting is not None
         self._waiting = proposal
+        return has_overtaken
 
     def tick(self, state: State, playback: Playback | None) -> tuple[Plan, Verdict] | None:
         """Do the slices of one tick.

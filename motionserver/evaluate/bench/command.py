@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from motionserver.errors import ConfigError
+from motionserver.evaluate.bench.flood import bench_flood
+from motionserver.evaluate.bench.guard import bench_guard
 from motionserver.evaluate.bench.latency import bench_latency
 from motionserver.evaluate.bench.loop import bench_loop
 from motionserver.evaluate.bench.plan import PlanBench, backends, bench_plan, headline
@@ -18,7 +20,7 @@ from motionserver.evaluate.bench.plan_steps import PERIOD
 from motionserver.evaluate.bench.report import Row, describe_machine, machine_text, table_text
 from motionserver.evaluate.files import check_file
 
-WHATS: Final = ("loop", "plan", "latency")
+WHATS: Final = ("loop", "guard", "flood", "plan", "latency")
 _MOST: Final = 3600.0
 """Longest stretch [s]."""
 
@@ -34,7 +36,7 @@ def run_bench(
     """Measure and print; every figure stands beside a sentinel of the same run.
 
     Args:
-        what: "loop", "plan", "latency" or "all".
+        what: One of `WHATS`, or "all".
         seconds: Length of each stretch [s].
         json_out: File for all figures.
         ticks: Periods per case of "plan" instead of ``seconds``.
@@ -64,10 +66,18 @@ def run_bench(
     out: dict[str, Any] = {"machine": machine, "seconds": seconds}
     measures: dict[str, Callable[[], list[Row]]] = {
         "loop": lambda: bench_loop(seconds),
+        "guard": lambda: bench_guard(seconds),
+        "flood": lambda: bench_flood(seconds),
         "plan": lambda: bench_plan(PlanBench(count, paced, only)),
         "latency": lambda: bench_latency(seconds),
     }
-    titles = {"loop": "lateness of ticks", "plan": "plan times", "latency": "latency"}
+    titles = {
+        "loop": "lateness of ticks",
+        "guard": "lateness of every tick under load",
+        "flood": "lateness of ticks in a flood",
+        "plan": "plan times",
+        "latency": "latency",
+    }
     for name in WHATS if what == "all" else (what,):
         rows = measures[name]()
         _tell("", table_text(titles[name], rows))

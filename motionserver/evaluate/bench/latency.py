@@ -88,7 +88,7 @@ def bench_latency(seconds: float, rate_hz: float = 60.0) -> list[Row]:
         BenchServer(rate_hz, realtime=True) as server,
         Sentinel(1.0 / rate_hz, seconds, 50, waits=True) as beside,
         ThreadPoolExecutor(1) as aside,
-        _punctual(),
+        punctual(),
     ):
         sender = StepSender(server.cue_port)
         engaging = aside.submit(server.engage)
@@ -143,7 +143,7 @@ def loopback_floor(seconds: float) -> Row:
         with helper as base:
             base.line()
             sender = StepSender(port)
-            with _punctual():
+            with punctual():
                 sender.drive(seconds)
             sender.close()
             base.process.terminate()
@@ -157,7 +157,7 @@ def loopback_floor(seconds: float) -> Row:
 
 
 @contextlib.contextmanager
-def _punctual() -> Iterator[None]:
+def punctual() -> Iterator[None]:
     """The simulator has a computer of its own: this thread gets SCHED_FIFO, if permitted."""
     with contextlib.suppress(OSError):
         os.sched_setscheduler(

@@ -45,22 +45,58 @@ async def press(port: int, seconds: float, connections: int, streams: int) -> di
     }
 
 
+class _Asker(asyncio.Protocol):
+    """One keep-alive connection that asks again as soon as it is answered."""
+
+    def __init__(self, port: int, counts: Counter[str], closed: asyncio.Event) -> None:
+        self._asked, self._counts, self._closed = _request("/api/status", port), counts, closed
+        self._answer = bytearray()
+        self._wanted = 0
+        self._transport: asyncio.WriteTransport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Ask."""
+        assert isinstance(transport, asyncio.WriteTransport)
+        self._transport = transport
+        transport.write(self._asked)
+
+    def data_received(self, data: bytes) -> None:
+        """Count a whole answer, and ask again."""
+        answer = self._answer
+        answer += data
+        if not self._wanted:
+            head = answer.find(b"\r\n\r\n")
+            if head < 0:
+                return
+            length = bytes(answer[:head]).lower().partition(b"content-length:")[2]
+            self._wanted = head + 4 + int(length.partition(b"\r\n")[0] or 0)
+        if len(answer) >= self._wanted and self._transport is not None:
+            self._counts["answers" if b" 200 " in answer[:20] else "refused"] += 1
+            self._wanted = 0
+            answer.clear()
+            self._transport.write(self._asked)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Let another one be made."""
+        self._closed.set()
+
+
 async def _ask(port: int, end: float, counts: Counter[str]) -> None:
     loop = asyncio.get_running_loop()
     while loop.time() < end:
+        closed = asyncio.Event()
         try:
-            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            transport, _ = await loop.create_connection(
+                lambda closed=closed: _Asker(port, counts, closed),  # type: ignore[misc]
+                "127.0.0.1",
+                port,
+            )
         except OSError:
             counts["broken"] += 1
             await asyncio.sleep(0.05)
             continue
-        with contextlib.closing(writer), contextlib.suppress(OSError, asyncio.IncompleteReadError):
-            while loop.time() < end:
-                writer.write(_request("/api/status", port))
-                head = (await reader.readuntil(b"\r\n\r\n")).lower()
-                length = head.partition(b"content-length:")[2].partition(b"\r\n")[0]
-                await reader.readexactly(int(length or 0))
-                counts["answers" if b" 200 " in head[:20] else "refused"] += 1
+        with contextlib.closing(transport):
+            await closed.wait()
 
 
 async def _listen(port: int, counts: Counter[str]) -> None:

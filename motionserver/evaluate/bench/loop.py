@@ -43,6 +43,7 @@ def bench_loop(
                 # ticks can be measured in any state; which it was stands beside them
                 with suppress(BenchError):
                     server.engage()
+                server.await_page()
                 for loaded in (False, True):
                     rows += measure_stretch(server, seconds, loaded)
             rows[-1].notes["judge's violations"] = server.verdict["violations"]
@@ -97,12 +98,18 @@ def _stretch(
     notes: dict[str, Any],
 ) -> Row:
     first, last = before["tick"], after["tick"]
-    counted = Histogram.from_mapping(last["late_bins"])
-    if before["pid"] == after["pid"]:
-        counted = counted.since(Histogram.from_mapping(first["late_bins"]))
-    else:
+    counted = histogram_between(before, after)
+    if before["pid"] != after["pid"]:
         notes["restarted"], first = True, {"missed": 0}
     row = row_of_histogram(name, counted, missed=last["missed"] - first["missed"])
     row.notes["p99 / sentinel's"] = row.p99_ms / max(sentinel.p99_ms, 1e-3)
     row.notes.update(notes)
     return row
+
+
+def histogram_between(before: dict[str, Any], after: dict[str, Any]) -> Histogram:
+    """Lateness of the ticks between two snapshots; of all, if another process wrote the second."""
+    counted = Histogram.from_mapping(after["tick"]["late_bins"])
+    if before["pid"] != after["pid"]:
+        return counted
+    return counted.since(Histogram.from_mapping(before["tick"]["late_bins"]))

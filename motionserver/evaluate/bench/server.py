@@ -7,7 +7,7 @@ import socket
 import subprocess
 import tempfile
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from math import ceil
 from pathlib import Path
 from types import TracebackType
@@ -23,7 +23,7 @@ RAISING: Final = 30.0
 """Longest wait for the platform to run [s]."""
 PARKING: Final = 60.0
 """Longest wait for it to park and end [s]."""
-FASTEST_PLANNER_HZ: Final = 120.0
+FASTEST_PLANNER_HZ: Final = 100.0
 """What ``rate_max_hz`` of its configuration says [Hz]."""
 OTHERS_PRIORITY: Final = 20
 """For SCHED_FIFO of base and simulator, if permitted: they have computers of their own."""
@@ -35,19 +35,22 @@ class BenchServer:
     Args:
         rate_hz: Packets per second of the platform [Hz].
         realtime: Whether its processes ask for SCHED_FIFO.
+        key: What the cues are signed with; empty for unsigned ones.
 
     Attributes:
         plan_hz: Plans per second that are due at this rate [Hz].
         cue_port: UDP port of the cue.
+        platform_port: UDP port on which it hears the base.
         web_port: TCP port of the page.
         base_log: What the base received, with instants.
         verdict: What the base's judge saw, once the context has been left.
     """
 
-    def __init__(self, rate_hz: float, realtime: bool) -> None:
-        self.rate_hz, self.realtime = rate_hz, realtime
+    def __init__(self, rate_hz: float, realtime: bool, key: bytes = b"") -> None:
+        self.rate_hz, self.realtime, self._key = rate_hz, realtime, key
         self.plan_hz = rate_hz / ceil(rate_hz / FASTEST_PLANNER_HZ)
         self.cue_port = free_port(socket.SOCK_DGRAM)
+        self.platform_port = free_port(socket.SOCK_DGRAM)
         self.web_port = free_port(socket.SOCK_STREAM)
         self.verdict: dict[str, Any] = {}
         self._stack = ExitStack()
@@ -123,7 +126,7 @@ class BenchServer:
             if op is not None:
                 try:
                     request = {"op": op, "by": "console"}
-                    reason = str(ask(self._folder / "run" / "guard.sock", request)["reason"])
+                    reason = str(ask(self.run_dir / "guard.sock", request)["reason"])
                 except RequestError as error:
                     reason = str(error)
             time.sleep(0.1)
@@ -131,6 +134,19 @@ class BenchServer:
             f"bench: the platform does not run ({state}: {reason}) within {RAISING:g} s; "
             f"{self._tail()}"
         )
+
+    def await_page(self) -> None:
+        """Wait until the page answers; it starts last, and below everybody.
+
+        Raises:
+            BenchError: It does not.
+        """
+        deadline = time.monotonic() + RAISING
+        while time.monotonic() < deadline and self._server.process.poll() is None:
+            with suppress(OSError), socket.create_connection(("127.0.0.1", self.web_port), 1.0):
+                return
+            time.sleep(0.1)
+        raise BenchError(f"bench: no page within {RAISING:g} s; {self._tail()}")
 
     def guard(self) -> dict[str, Any]:
         """The guard's newest snapshot."""
@@ -141,6 +157,11 @@ class BenchServer:
         """The planner's newest snapshot."""
         message = self._maps.planner.read()
         return {} if message is None else dict(json.loads(message[1]))
+
+    @property
+    def run_dir(self) -> Path:
+        """Where its processes meet."""
+        return self._folder / "run"
 
     def _until(self, state: str, patience: float) -> None:
         deadline = time.monotonic() + patience
@@ -158,7 +179,7 @@ class BenchServer:
         deadline = time.monotonic() + 10.0
         while time.monotonic() < deadline and self._server.process.poll() is None:
             try:
-                return Maps(self._folder / "run")
+                return Maps(self.run_dir)
             except (OSError, ValueError):
                 time.sleep(0.02)
         raise BenchError(f"bench: the server does not start; {self._tail()}")
@@ -167,14 +188,23 @@ class BenchServer:
         return "the end of its log:\n" + tail_of(self._folder / "server.log")
 
     def _config(self, base_port: int) -> dict[str, Any]:
+        source = {"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}
+        if self._key:
+            file = self._folder / "key"
+            file.write_bytes(self._key)
+            source["key_file"] = str(file)
         return {
             "server": {
-                "run_dir": str(self._folder / "run"),
+                "run_dir": str(self.run_dir),
                 "state_dir": str(self._folder / "state"),
                 "realtime": self.realtime,
             },
-            "platform": {"port": base_port, "local_port": 0, "rate_hz": float(self.rate_hz)},
-            "sources": [{"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}],
+            "platform": {
+                "port": base_port,
+                "local_port": self.platform_port,
+                "rate_hz": float(self.rate_hz),
+            },
+            "sources": [source],
             "cueing": {"rate_max_hz": FASTEST_PLANNER_HZ},
             "web": {"port": self.web_port},
         }

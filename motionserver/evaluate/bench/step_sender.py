@@ -20,17 +20,23 @@ HOLD: Final = (0.3, 0.5)
 class StepSender:
     """Sends cues a hundred times a second, and steps between them.
 
+    Args:
+        port: Where to, on loopback.
+        seed: Of the phases.
+        key: What the cues are signed with, if anything.
+
     Attributes:
         sent_ns: When each packet was sent [ns].
         steps_ns: When each step was [ns].
         by_bytes: When each packet was sent, by what was sent [ns].
     """
 
-    def __init__(self, port: int, seed: int = 1) -> None:
+    def __init__(self, port: int, seed: int = 1, key: bytes | None = None) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         # not connected: a planner that is still starting refuses nothing
         self._peer = ("127.0.0.1", port)
         self._random = random.Random(seed)
+        self._key = key
         self._start_ns = time.monotonic_ns()
         self._level = 0.0
         self.sent_ns: list[int] = []
@@ -46,7 +52,7 @@ class StepSender:
         now = time.monotonic_ns()
         motion = Motion((self._level, 0.0, 0.0), (0.0, 0.0, 0.0))
         cue = Cue(7, len(self.sent_ns), now - self._start_ns, now, motion)
-        data = encode_cue(cue)
+        data = encode_cue(cue, self._key)
         now = time.monotonic_ns()
         self._socket.sendto(data, self._peer)
         self.sent_ns.append(now)
