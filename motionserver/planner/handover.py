@@ -13,6 +13,8 @@ from motionserver.telemetry.link import STATES, GuardClock, Maps
 
 SECOND: Final = 1_000_000_000
 ALIVE_NS: Final = 200_000_000
+STANDS_NS: Final = 20_000_000
+"""So late behind its own slot, and a slot later, a guard stands still, and its plan with it [ns]."""
 KEPT: Final = 16
 PATIENCE: Final = 1
 CONFIDENCE: Final = 300
@@ -64,6 +66,9 @@ class HandoverClock:
         """Choose parent and instant for a plan that will be ready in ``expected_ns`` [ns]."""
         clock = self.clock
         if clock is None or STATES[clock.state] not in CUED or clock.newest_id == 0:
+            return None
+        if now_ns - clock.due_ns > max(self._period_ns, STANDS_NS):
+            # a plan for an instant guessed from the time that passes would wait for it too long
             return None
         parent = self._plan(clock.newest_id)
         if parent is None:

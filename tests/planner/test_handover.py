@@ -71,6 +71,18 @@ def test_the_instant_is_the_first_slot_the_plan_can_meet(
     assert found.takeover == pytest.approx(0.4 + slots * PERIOD)
 
 
+def test_while_the_guard_stands_still_nothing_is_planned(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    due, stands = int(PERIOD * 1e9), 20 * MS
+    for now, planned in [(due, True), (due + stands, True), (due + stands + 1, False)]:
+        scene.clock.read(now)
+        assert (scene.clock.handover(now, 0) is not None) == planned
+    # a slow platform's guard may be a slot behind
+    slow = HandoverClock(scene.maps, 0.1)
+    slow.read(due + 100 * MS)
+    assert slow.handover(due + 100 * MS, 0) is not None
+
+
 def test_a_plan_just_taken_over_is_left_to_play_a_little(scene: Scene) -> None:
     scene.clock.proposed(plan(5, 4))
     scene.clock.proposed(plan(6, 5))

@@ -83,7 +83,10 @@ _RECORD = (
 )
 _SUPERVISOR = ("inconsistent", "astray", "_paused_ns", "_excused")
 _SOURCE = ("status", "_driving_since", "_silent_since")
-_DEVICE = ("newest", "_valid_since", "_astray_since", "_excused", "_excused_ns")
+_DEVICE = (
+    *("newest", "_valid_since", "_astray_since", "_excused", "_excused_ns"),
+    *("_still_at", "_still_since"),
+)
 
 
 class CoarseGuard:
@@ -243,7 +246,7 @@ class CoarseGuard:
         state, since, playback, deadline, accepted, reset, leaving, engaged_once = node.record
         inconsistent, astray, paused, (excused_of, resumed) = node.supervisor
         status, driving, silent = node.source
-        newest, valid, off, excused, excused_ns = node.device
+        newest, valid, off, excused, excused_ns, still_at, still_since = node.device
         now = node.now
         timed = state in (State.RAISING, State.PARKING)
         latched = state in (State.FAULT, State.SAFE)
@@ -259,6 +262,8 @@ class CoarseGuard:
                 _age(now, newest.arrival_ns, 4),
                 0 if lost else _age(now, valid, 1),
                 _age(now, excused_ns, 4) if excused is newest else None,
+                None if still_at is None else tuple(np.round(still_at, 4)),
+                _age(now, still_since, 1),
             )
         upstream = None
         if state in CUED or state is State.RAISING:

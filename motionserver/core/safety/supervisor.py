@@ -99,14 +99,15 @@ class Supervisor:
         if newest.estop or self.device.valid_for(now_ns) < self.patience.valid:
             return
         down, up = newest.phase is Phase.DOWN, newest.phase is Phase.UP
+        begins = up and self.device.stands(now_ns)
         if record.reset_until_ns > now_ns and is_standing(record.playback):
             if down:
                 yield Event.RESET_DOWN
-            elif up:
+            elif begins:
                 yield Event.RESET_UP
         if down and (record.state is not State.PARKING or is_standing(record.playback)):
             yield Event.DEVICE_DOWN
-        if up:
+        if begins:
             yield Event.DEVICE_UP
         if up or self.dry_run:
             yield Event.RAISED

@@ -35,6 +35,8 @@ class Patience:
         track: Tracking error that is always allowed [m].
         track_lag: Further tracking error per leg speed [s].
         track_time: How long a larger error is borne.
+        still: How long measured legs must not move before a plan may begin where they are.
+        quiver: What counts as not moving [m].
     """
 
     valid: float = 0.3
@@ -51,6 +53,8 @@ class Patience:
     track: float = 0.010
     track_lag: float = 0.15
     track_time: float = 0.1
+    still: float = 0.3
+    quiver: float = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +128,8 @@ class DeviceWatch:
         self._astray_since: int | None = None
         self._excused: Feedback | None = None
         self._excused_ns = 0
+        self._still_at: Array | None = None
+        self._still_since = 0
         self.newest: Feedback | None = None
         self.error = 0.0
 
@@ -131,6 +137,14 @@ class DeviceWatch:
         """Take a decoded answer."""
         if self._valid_since is None or self.is_lost(feedback.arrival_ns):
             self._valid_since = feedback.arrival_ns
+            self._still_at = None
+        legs = measured_legs(self._machine, feedback)
+        moved = legs is not None and (
+            self._still_at is None
+            or bool(np.any(np.abs(legs - self._still_at) > self._patience.quiver))
+        )
+        if moved:
+            self._still_at, self._still_since = legs, feedback.arrival_ns
         self.newest = feedback
 
     def age(self, now_ns: int) -> float:
@@ -153,6 +167,15 @@ class DeviceWatch:
         if self._valid_since is None or self.is_lost(now_ns):
             return 0.0
         return (now_ns - self._valid_since) / SECOND
+
+    def stands(self, now_ns: int) -> bool:
+        """True if the measured legs have not moved for a while, or are not measured at all.
+
+        What it reports is late: a plan that begins where a moving platform was would be a jump.
+        """
+        return self._still_at is None or (
+            (now_ns - self._still_since) / SECOND >= self._patience.still
+        )
 
     def legs(self) -> Array | None:
         """Measured pin-to-pin lengths, (6,) [m]; None if unknown."""

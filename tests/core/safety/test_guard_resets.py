@@ -74,7 +74,7 @@ def test_parked_that_finds_itself_up_parks():
     b = Bench(compact())
     b.until("PARKED", 1.0)
     b.device.put_up(np.zeros(6))
-    b.until("PARKING", 0.1)
+    assert b.until("PARKING", 0.5) == pytest.approx(0.3, abs=0.03)
     b.until("PARKED", 10.0)
 
 
@@ -129,3 +129,39 @@ def test_a_reset_waits_until_the_device_stands_still():
     assert b.state == "FAULT"
     b.device.phase = Phase.DOWN
     b.until("PARKED", 0.1)
+
+
+def test_a_reset_waits_until_a_raised_device_no_longer_moves():
+    b = in_state("RUN")
+    b.device.silent = True
+    b.until("FAULT", 0.2)
+    b.device.silent = False
+    b.run(5.0)
+    begin = np.array(b.device.legs)
+    for k in range(240):
+        # it is moved by something else
+        b.device.legs = begin + 0.02 * np.sin(0.05 * k)
+        b.tick(*(["reset"] if k == 60 else []))
+    assert b.state == "FAULT"
+    frames = len(b.sent)
+    assert b.until("PARKING", 1.0) == pytest.approx(0.3, abs=0.06)
+    b.until("PARKED", 40.0)
+    assert np.abs(b.sent[frames + 1].legs - begin).max() < 0.03
+    legal(b)
+
+
+def test_who_begins_beside_a_device_that_moves_waits_until_it_stands():
+    b = Bench(compact())
+    b.device.put_up(np.array([0.03, 0.0, 0.02, 0.0, 0.0, 0.0]))
+    begin = np.array(b.device.legs)
+    for k in range(240):
+        b.device.legs = begin + 0.01 * np.sin(0.1 * k)
+        b.tick()
+    assert b.state == "OFFLINE"
+    stood = np.array(b.device.legs)
+    b.until("PARKING", 0.5)
+    b.run(0.02)
+    first = next(s for s in b.sent if s.order is Order.FOLLOW)
+    assert np.abs(first.legs - stood).max() < 2e-3
+    b.until("PARKED", 20.0)
+    legal(b)

@@ -89,16 +89,12 @@ def test_the_account_convicts_a_jump():
         assert any("other kinematics" in text for text in world.account.problems())
 
 
-@pytest.mark.xfail(reason=FAULTS[17].open, strict=True)
 def test_a_short_gap_of_the_guard_is_only_an_event():
     outcome = Scene([FAULTS[20]], 2, SECONDS).play()
     assert outcome.problems == []
     assert outcome.notes == []
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a reset is granted while the base still moves: its first setpoint jumps"
-)
 def test_a_hasty_reset_after_the_platform_did_not_follow():
     played = Scene([FAULTS[13]], 1, SECONDS)
     played.is_hasty = True
