@@ -94,6 +94,9 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             "arm": list(cueing.vehicle_head_m),
             "tuning": tuning,
             "side_engines": list(side),
+            "sessions_file": str(
+                state_dir_of(config) / f"sessions-{config.platform.local_port}.bin"
+            ),
         },
         "sources": [_source(one) for one in config.sources],
         "web": _web(config, run_dir, machine_to_mapping(machine)),
