@@ -49,6 +49,7 @@ class World:
             port=8080,
             tokens_file=tokens,
             run_dir=folder,
+            audit_file=folder / "audit.jsonl",
             presets_dir=folder / "presets",
             machine=machine_to_mapping(MACHINE),
             **values,
@@ -85,14 +86,16 @@ class World:
         """Everything a request could change."""
         shelf = self.config.presets_dir
         kept = sorted((p.name, p.read_bytes()) for p in shelf.iterdir()) if shelf.exists() else []
-        audit = self.config.run_dir / "audit.jsonl"
+        audit = self.config.audit_file
+        noted = audit.read_text().splitlines() if audit.exists() else []
         return (
             self.scene.state,
             self.scene.book.version,
             self.scene.book.model.model_dump(),
             list(self.scene.beside),
             kept,
-            audit.read_bytes() if audit.exists() else b"",
+            # that somebody was refused changes nothing
+            [line for line in noted if json.loads(line)["action"] != "refused"],
             [request for request in self.asked if not is_question(request)],
         )
 
