@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 
 from browser.scene import TOKENS, Scene, t2_compact
+from starlette.routing import Mount, WebSocketRoute
 from starlette.testclient import TestClient
 
 from motionserver.core.limits import machine_to_mapping
@@ -101,18 +102,24 @@ class World:
 
 
 def every_route(app):
-    """(methods, path) of each route, those of included routers too; folders as one more path."""
+    """(methods, path) of each route: of included routers, of applications mounted below, of folders
+    (one file stands for a folder), and of websockets."""
     found, waiting = [], [("", route) for route in app.routes]
     while waiting:
         prefix, route = waiting.pop()
         inner = getattr(route, "original_router", None)
         if inner is not None:
             waiting += [(prefix + route.include_context.prefix, one) for one in inner.routes]
+        elif isinstance(route, Mount) and route.routes:
+            waiting += [(prefix + route.path, one) for one in route.routes]
+        elif isinstance(route, Mount):
+            found.append((frozenset({"GET", "HEAD"}), prefix + route.path + "/app.js"))
+        elif isinstance(route, WebSocketRoute):
+            found.append((frozenset({"WEBSOCKET"}), prefix + route.path))
         elif getattr(route, "methods", None):
             found.append((frozenset(route.methods), prefix + route.path))
         else:
-            # a folder or anything else that is not a route: one file below it stands for it
-            found.append((frozenset({"GET", "HEAD"}), prefix + route.path + "/app.js"))
+            raise AssertionError(f"a kind of route that is not tried: {route!r}")
     return sorted(found, key=lambda one: one[1])
 
 
