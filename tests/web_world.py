@@ -4,6 +4,7 @@ import json
 from dataclasses import dataclass
 
 from browser.scene import TOKENS, Scene, t2_compact
+from starlette.routing import Mount, WebSocketRoute
 from starlette.testclient import TestClient
 
 from motionserver.core.limits import machine_to_mapping
@@ -49,6 +50,7 @@ class World:
             port=8080,
             tokens_file=tokens,
             run_dir=folder,
+            audit_file=folder / "audit.jsonl",
             presets_dir=folder / "presets",
             machine=machine_to_mapping(MACHINE),
             **values,
@@ -85,31 +87,39 @@ class World:
         """Everything a request could change."""
         shelf = self.config.presets_dir
         kept = sorted((p.name, p.read_bytes()) for p in shelf.iterdir()) if shelf.exists() else []
-        audit = self.config.run_dir / "audit.jsonl"
+        audit = self.config.audit_file
+        noted = audit.read_text().splitlines() if audit.exists() else []
         return (
             self.scene.state,
             self.scene.book.version,
             self.scene.book.model.model_dump(),
             list(self.scene.beside),
             kept,
-            audit.read_bytes() if audit.exists() else b"",
+            # that somebody was refused changes nothing
+            [line for line in noted if json.loads(line)["action"] != "refused"],
             [request for request in self.asked if not is_question(request)],
         )
 
 
 def every_route(app):
-    """(methods, path) of each route, those of included routers too; folders as one more path."""
+    """(methods, path) of each route: of included routers, of applications mounted below, of folders
+    (one file stands for a folder), and of websockets."""
     found, waiting = [], [("", route) for route in app.routes]
     while waiting:
         prefix, route = waiting.pop()
         inner = getattr(route, "original_router", None)
         if inner is not None:
             waiting += [(prefix + route.include_context.prefix, one) for one in inner.routes]
+        elif isinstance(route, Mount) and route.routes:
+            waiting += [(prefix + route.path, one) for one in route.routes]
+        elif isinstance(route, Mount):
+            found.append((frozenset({"GET", "HEAD"}), prefix + route.path + "/app.js"))
+        elif isinstance(route, WebSocketRoute):
+            found.append((frozenset({"WEBSOCKET"}), prefix + route.path))
         elif getattr(route, "methods", None):
             found.append((frozenset(route.methods), prefix + route.path))
         else:
-            # a folder or anything else that is not a route: one file below it stands for it
-            found.append((frozenset({"GET", "HEAD"}), prefix + route.path + "/app.js"))
+            raise AssertionError(f"a kind of route that is not tried: {route!r}")
     return sorted(found, key=lambda one: one[1])
 
 

@@ -29,6 +29,7 @@ from motion_protocol import (
 )
 
 from .address import parse_address
+from .outage import Outage
 
 _DRAIN_MAX: Final = 64
 _ROUND_TRIPS: Final = 16
@@ -50,7 +51,8 @@ class CueSender:
         last_error: What the network last refused, or None.
         refused_replies: Datagrams that were no status for this session.
         sent: Packets handed to the network.
-        session: Random number of this sender, 32 bits.
+        session: Random number of this sender, 32 bits. With a key it is taken anew when the server
+            was away: after a power cut a server believes no session that it had heard before.
         unsent: Packets the network refused.
     """
 
@@ -88,6 +90,7 @@ class CueSender:
         self._status: Status | None = None
         self._round_trips: list[tuple[float, int]] = []
         self._is_open = True
+        self._outage = Outage()
         self.session = secrets.randbits(32) if session is None else session
         self.sent = 0
         self.unsent = 0
@@ -168,6 +171,16 @@ class CueSender:
         """Say that this client leaves. `close` does it too."""
         return self._emit(Mode.BYE, None, Flags(0), None, None, None)
 
+    def renew(self) -> None:
+        """Go on as another session: what to do when a signed one is refused as `session-over`.
+
+        It is done without being asked when nobody listened for half a second. To a server that
+        still hears the former session this is a second client, which has to wait.
+        """
+        self.session = secrets.randbits(32)
+        self._sequence = 0
+        self._status = None
+
     def status(self) -> Status | None:
         """Read the answers that have come and return the newest of all, None before the first."""
         for _ in range(_DRAIN_MAX):
@@ -176,7 +189,7 @@ class CueSender:
             except BlockingIOError:
                 break
             except OSError as error:  # the port was closed: reported once per packet sent
-                self.last_error = error
+                self._refused(error)
                 continue
             self._take(data)
         return self._status
@@ -228,13 +241,23 @@ class CueSender:
         cue = Cue(self.session, sequence, time_ns, now, motion, mode, flags, preview, driver)
         data = encode_cue(cue, self._key)
         self._sequence = (sequence + 1) & 0xFFFFFFFF
+        if self._sequence == 0 and self._key is not None:
+            # of a signed session no sequence is believed twice
+            self.renew()
         try:
             self._socket.send(data)
             self.sent += 1
         except OSError as error:
             self.unsent += 1
-            self.last_error = error
+            self._refused(error)
         return sequence
+
+    def _refused(self, error: OSError) -> None:
+        """Take note of what the network refused."""
+        self.last_error = error
+        away = isinstance(error, ConnectionRefusedError) and self._outage.refused(self._clock_ns())
+        if away and self._key is not None:
+            self.renew()
 
     def _take(self, data: bytes) -> None:
         status: Status | None = None

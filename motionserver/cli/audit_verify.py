@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from motionserver.errors import ConfigError
-from motionserver.settings.config import load_config, run_dir_of
+from motionserver.settings.config import load_config, state_dir_of
 from motionserver.web.audit_chain import Head, Line, read_head, read_lines, rotated, walk
 
 LIMITS: Final = (
@@ -30,7 +30,7 @@ def verify_text(file: Path | None, config: Path | None, noted: str) -> tuple[str
     Raises:
         ConfigError: The log cannot be read.
     """
-    path = run_dir_of(load_config(config)) / "audit.jsonl" if file is None else file
+    path = state_dir_of(load_config(config)) / "audit.jsonl" if file is None else file
     lines, head, has_older = _read(path)
     found = walk(lines, head, has_older)
     files = Counter(line.file for line in lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from motionserver.doctor.finding import Finding, Level
@@ -58,29 +58,31 @@ def token_file(file: KeyFile) -> Finding:
 
 
 def secret_file(file: KeyFile) -> Finding:
-    """A key of signed packets or of the page's certificate."""
+    """A key of signed packets: others must not read it, or the server does not start."""
+    return _key(
+        file, 0o077, "others could read the key, and sign with it: the server does not start"
+    )
+
+
+def tls_key_file(file: KeyFile) -> Finding:
+    """The key of the page's certificate: a secret that everybody can read stops the page."""
+    return _key(file, 0o007, "every user may read the key: the page does not start")
+
+
+def _key(file: KeyFile, forbidden: int, means: str) -> Finding:
+    """A key with permission bits that are a problem; what else others may do is a warning."""
     name = file.name
     bad = _unreadable(name, file, "the server will not start")
     if bad is not None:
         return bad
     assert file.mode is not None
+    found = f"{file.path}: mode {file.mode:04o}"
+    if file.mode & forbidden:
+        return Finding(name, Level.PROBLEM, found, means, f"chmod 600 {file.path}")
     if file.mode & 0o077:
-        return Finding(
-            name, Level.WARNING, f"{file.path}: mode {file.mode:04o}",
-            "others on this computer can read the secret, and sign with it",
-            f"chmod 600 {file.path}",
-        )  # fmt: skip
-    return Finding(name, Level.OK, f"{file.path}: mode {file.mode:04o}", "only this user reads it")
-
-
-def tls_key_file(file: KeyFile) -> Finding:
-    """The key of the page's certificate: a secret that everybody can read stops the page."""
-    found = secret_file(file)
-    if file.mode is None or not file.readable or not file.mode & 0o007:
-        return found
-    return replace(
-        found, level=Level.PROBLEM, means="every user may read the key: the page does not start"
-    )
+        means = "others on this computer can read the secret, and use it"
+        return Finding(name, Level.WARNING, found, means, f"chmod 600 {file.path}")
+    return Finding(name, Level.OK, found, "only this user reads it")
 
 
 def enable_switch(file: KeyFile) -> Finding:

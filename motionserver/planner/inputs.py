@@ -6,13 +6,14 @@ import logging
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Final, Protocol
 
-from motionserver.core.intake.gate import REORDER_NS, Gate
+from motionserver.core.intake.gate import REORDER_NS, Gate, Owner
 from motionserver.core.state import DriveMode, VehicleMotion
 from motionserver.planner.crowd import Crowd
 from motionserver.planner.options import InputOptions
 from motionserver.planner.preview import PreviewInlet
+from motionserver.planner.session_file import SessionKeeper
 from motionserver.sources.base import SourceError, SourceFormat
 from motionserver.sources.registry import make_source
 from motionserver.sources.sizes import sizes_of
@@ -22,6 +23,11 @@ from motionserver.telemetry.ticker import now_ns
 
 log = logging.getLogger("motionserver.planner")
 SHOWN_ERRORS = 5
+HINTS: Final = {
+    "session-over": "session-over: played again from a recording, or a client that must take a "
+    "new session number"
+}
+"""What is said of a refusal beside its name."""
 MOST_SENDERS = 8
 """Senders per input whose format is remembered; more are strangers, and start anew."""
 
@@ -110,8 +116,21 @@ def _peer(name: str) -> tuple[str, int]:
 class Inputs:
     """The vehicle's sources, with one owner, and the platform's own sensor, with another."""
 
-    def __init__(self, inputs: list[Input], may_change_owner: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        inputs: list[Input],
+        may_change_owner: Callable[[], bool],
+        sessions: SessionKeeper | None = None,
+    ) -> None:
+        """Take opened inputs.
+
+        Args:
+            inputs: Whose packets are read.
+            may_change_owner: Whether another client may move the platform now.
+            sessions: Remembers sessions of sources with a key; None believes what was recorded.
+        """
         self.inputs = inputs
+        self._sessions = sessions
         self.vehicle = Gate(may_change_owner)
         self.sensor = Gate()
         self.previews = PreviewInlet()
@@ -143,9 +162,12 @@ class Inputs:
                     self._refused("not_measured", f"{address}: not flagged as measured")
                     continue
                 gate = self.sensor if motion.at_platform else self.vehicle
-                refusal = gate.refuse(source.name, address, motion)
+                refusal = self._over(source, address, motion, gate) or gate.refuse(
+                    source.name, address, motion
+                )
                 if refusal is not None:
-                    self._refused(refusal, f"{source.name} from {address}: {refusal}")
+                    said = HINTS.get(refusal, refusal)
+                    self._refused(refusal, f"{source.name} from {address}: {said}")
                 elif motion.at_platform:
                     sensor.append(motion)
                 else:
@@ -153,6 +175,7 @@ class Inputs:
                     self.owner_input = source
         self.counters["accepted"] += len(vehicle)
         self.counters["accepted_sensor"] += len(sensor)
+        self._keep_sessions()
         if vehicle:
             # the newest is what counts; all sources were read by now
             vehicle[-1] = self.previews.attach(vehicle[-1])
@@ -192,8 +215,27 @@ class Inputs:
             self._refused("decoder_failed", f"{source.name} from {address}: {error!r}")
         return None
 
+    def _over(self, source: Input, address: str, motion: VehicleMotion, gate: Gate) -> str | None:
+        """Why a signed packet is not believed: it, or a later one of its session, was heard."""
+        if self._sessions is None or source.options.key is None or motion.sequence is None:
+            return None
+        mark = self._sessions.hear(motion.session, motion.sequence)
+        if motion.sequence > mark:
+            return None
+        if gate.owner != Owner(source.name, address, motion.session):
+            return "session-over"
+        # by the names of the order that every owner has to keep
+        return "replayed" if motion.sequence == mark else "reordered"
+
+    def _keep_sessions(self) -> None:
+        if self._sessions is not None:
+            self._sessions.keep()
+            for name, count in self._sessions.counters.items():
+                self.counters[name] = count
+
     def _take_preview(self, source: Input, address: str, motion: VehicleMotion) -> None:
-        refusal = self.previews.offer(source.name, address, motion)
+        refusal = self._over(source, address, motion, self.previews.gate)
+        refusal = refusal or self.previews.offer(source.name, address, motion)
         if refusal is None:
             self.counters["accepted_preview"] += 1
         else:
@@ -222,3 +264,5 @@ class Inputs:
         """Close all."""
         for source in self.inputs:
             source.transport.close()
+        if self._sessions is not None:
+            self._sessions.close()

@@ -27,6 +27,7 @@ from motionserver.planner.handover import Handover, HandoverClock
 from motionserver.planner.inputs import Inputs, open_input
 from motionserver.planner.options import PlannerOptions
 from motionserver.planner.reply import status_packet
+from motionserver.planner.session_file import keeper_of
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
 from motionserver.planner.tuner import Tuner
@@ -61,7 +62,9 @@ class PlannerLoop:
         self._clock = HandoverClock(self._maps, options.send_period)
         self._state: State | None = None
         self._inputs = Inputs(
-            [open_input(one) for one in options.inputs], lambda: self._state is not State.RUN
+            [open_input(one) for one in options.inputs],
+            lambda: self._state is not State.RUN,
+            keeper_of(options, run_dir),
         )
         self._intake = Intake()
         self._measured = MeasuredForce()

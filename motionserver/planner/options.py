@@ -49,6 +49,7 @@ class PlannerOptions:
         inputs: The sources.
         tuning: Tunables at the start, in the units of the page.
         tuning_file: Where the tuning in force survives a restart of the planner.
+        sessions_file: Where signed sessions are remembered over a restart of the server.
         realtime: True: ask for real-time scheduling.
         side_engines: Algorithms that run beside the driving one at the start.
     """
@@ -61,6 +62,7 @@ class PlannerOptions:
     inputs: tuple[InputOptions, ...]
     tuning: dict[str, Any]
     tuning_file: Path
+    sessions_file: Path
     realtime: bool
     side_engines: tuple[str, ...] = ()
 
@@ -91,6 +93,7 @@ def read_options(run_dir: Path) -> PlannerOptions:
         inputs=inputs,
         tuning=planner["tuning"],
         tuning_file=run_dir / "tuning.json",
+        sessions_file=Path(planner["sessions_file"]),
         realtime=data["realtime"],
         side_engines=tuple(planner["side_engines"]),
     )

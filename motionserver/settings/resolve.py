@@ -16,11 +16,10 @@ from motionserver.platforms.base import PlatformOptions
 from motionserver.platforms.registry import make_platform
 from motionserver.settings.config import Config, SourceSection, split_address, state_dir_of
 from motionserver.settings.fields import TuningError
+from motionserver.settings.key_file import read_key
 from motionserver.settings.machine import load_machine, unchecked_limits
 from motionserver.settings.side_engines import side_names
 from motionserver.settings.tuning import apply_changes, default_for
-
-SHORTEST_KEY = 16
 
 
 def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, Any]:
@@ -94,6 +93,9 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             "arm": list(cueing.vehicle_head_m),
             "tuning": tuning,
             "side_engines": list(side),
+            "sessions_file": str(
+                state_dir_of(config) / f"sessions-{config.platform.local_port}.bin"
+            ),
         },
         "sources": [_source(one) for one in config.sources],
         "web": _web(config, run_dir, machine_to_mapping(machine)),
@@ -114,18 +116,14 @@ def _source(source: SourceSection) -> dict[str, Any]:
     host, port = split_address(source.listen)
     key = b""
     if source.key_file:
-        try:
-            key = Path(source.key_file).expanduser().read_bytes()
-        except OSError as error:
-            raise ConfigError(
-                f"{where}: key_file", f"cannot be read ({error.strerror})", "Give a readable file."
-            ) from error
-        if len(key) < SHORTEST_KEY:
+        if source.kind == "beamng":
             raise ConfigError(
                 f"{where}: key_file",
-                f"{len(key)} bytes",
-                f"Give at least {SHORTEST_KEY} random bytes, for example from /dev/urandom.",
+                "the game's packets carry no signature, so that the key would keep nobody out",
+                "Remove it; beyond 127.0.0.1 the game's packets need allow_unsigned = true and a "
+                "network that nobody else can reach.",
             )
+        key = read_key(Path(source.key_file).expanduser(), f"{where}: key_file")
     if not _is_loopback(host) and not key and not source.allow_unsigned:
         raise ConfigError(
             f"{where}: listen",
@@ -166,6 +164,7 @@ def _web(config: Config, run_dir: Path, machine: dict[str, object]) -> dict[str,
         "port": web.port,
         "tokens_file": web.tokens_file or str(state_dir / "tokens.json"),
         "run_dir": str(run_dir),
+        "audit_file": str(state_dir / "audit.jsonl"),
         "presets_dir": str(state_dir / "presets"),
         "machine": machine,
         "allowed_hosts": web.allowed_hosts,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import FastAPI, Request
@@ -20,12 +23,14 @@ from motionserver.web.desk import Desk
 from motionserver.web.gate import Gate
 from motionserver.web.metrics import registry_for, text_of
 from motionserver.web.refusal import Refusal, json_response
+from motionserver.web.refusals import Refusals
 from motionserver.web.requests import Ask, Peer, guard_refusal
 from motionserver.web.side_routes import side_routes
 from motionserver.web.snapshot import SnapshotSource, StatusBoard
 from motionserver.web.stream import Streams
 from motionserver.web.tokens import Role, load_tokens
 from motionserver.web.tuning_routes import tuning_routes
+from motionserver.web.watch import Watch
 
 _log = logging.getLogger(__name__)
 _STATIC = Path(__file__).parent / "static"
@@ -54,16 +59,29 @@ def build_app(
     Raises:
         WebConfigError: The tokens file cannot be used.
     """
-    app = FastAPI(title="motionserver", docs_url=None, redoc_url=None, openapi_url=None)
     doorkeeper = Doorkeeper(load_tokens(config.tokens_file), attempts or Attempts())
     board = StatusBoard(guard, planner, service, config)
     answered: Counter[str] = Counter()
+    audit = Audit(config.audit_file)
+    refusals = Refusals(audit)
+    watch = Watch(board, audit)
+
+    @asynccontextmanager
+    async def watching(_: FastAPI) -> AsyncIterator[None]:
+        task = asyncio.create_task(watch.run())
+        yield
+        task.cancel()
+
+    app = FastAPI(
+        title="motionserver", docs_url=None, redoc_url=None, openapi_url=None, lifespan=watching
+    )
     desk = Desk(
         config,
         Peer("guard", ask_guard),
         Peer("planner", ask_planner),
         PresetShelf(config.presets_dir),
-        Audit(config.run_dir / "audit.jsonl"),
+        audit,
+        refusals,
     )
     _reading_routes(app, desk, board, answered)
     _motion_routes(app, desk)
@@ -71,7 +89,13 @@ def build_app(
     app.include_router(side_routes(desk))
     app.mount("/static", StaticFiles(directory=_STATIC), name="static")
     _error_answers(app)
-    app.add_middleware(Gate, host_names=config.host_names, doorkeeper=doorkeeper, answered=answered)
+    app.add_middleware(
+        Gate,
+        host_names=config.host_names,
+        doorkeeper=doorkeeper,
+        answered=answered,
+        refusals=refusals,
+    )
     return app
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import fcntl
 import json
+import time
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -23,12 +27,17 @@ from motionserver.web.auth import Caller
 _LARGEST: Final = 4 * 1024 * 1024
 """Size at which the file is put aside as `.1` [B]."""
 
+_TRIES: Final = 10
+_PAUSE: Final = 1e-3
+"""How long another server is waited for, with all requests [s]."""
+
 
 class Audit:
     """Appends to a file; a disk that refuses costs the line, never the request.
 
     The newest hash is kept in a file beside it, so that `motionserver audit verify` sees an end
-    that was cut off. After a power cut it goes on behind what the cut left.
+    that was cut off. After a power cut it goes on behind what the cut left. Several servers of one
+    state directory may write to one log: each finds out under a lock what the others have written.
 
     Args:
         path: The file.
@@ -37,6 +46,13 @@ class Audit:
 
     def __init__(self, path: Path, largest: int = _LARGEST) -> None:
         self._path, self._largest = path, largest
+        self.lost = 0
+        self.unsealed = 0
+        self._load()
+
+    def _load(self) -> None:
+        path = self._path
+        self._left = _about(path)
         lines, older = _lines(path), _lines(rotated(path))
         whole = [line for line in (*older, *lines) if line.entry is not None]
         self._previous = whole[-1].digest if whole else ""
@@ -44,8 +60,6 @@ class Audit:
         self._resume = self._found(path, lines)
         # an end of line that is missing is given first, or the next line would stand on that one
         self._glue = "\n" if lines and not lines[-1].is_ended else ""
-        self.lost = 0
-        self.unsealed = 0
 
     def _found(self, path: Path, lines: list[Line]) -> dict[str, str]:
         """What is not as it was left, for the line that resumes."""
@@ -70,18 +84,26 @@ class Audit:
             result: "done", or why not.
             more: Old and new values and the like.
         """
-        who = {
-            "role": caller.role.name.lower(),
-            "token": caller.token_id,
-            "address": caller.address,
-            "result": result,
-        }
+        role = caller.role.name.lower()
+        who = {"role": role, "token": caller.token_id, "address": caller.address}
+        self.write({"action": action, **who, "result": result, **more})
+
+    def write(self, entry: dict[str, Any]) -> None:
+        """Write one line, with the time and the hash of the line before it.
+
+        Args:
+            entry: What it says; "action" names it.
+        """
         try:
-            if self._resume:
-                self._append({"action": RESUME, **self._resume})
-                self._resume = {}
-            self._rotate()
-            self._append({"action": action, **who, **more})
+            with _alone(self._path):
+                if _about(self._path) != self._left:
+                    self._load()
+                if self._resume:
+                    self._append({"action": RESUME, **self._resume})
+                    self._resume = {}
+                self._rotate()
+                self._append(entry)
+                self._left = _about(self._path)
         except OSError:
             self.lost += 1
 
@@ -119,6 +141,34 @@ class Audit:
             temporary.replace(path)
         except OSError:
             self.unsealed += 1
+
+
+@contextlib.contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Nobody else writes meanwhile.
+
+    Raises:
+        OSError: Somebody else does not come to an end; the page has to go on.
+    """
+    with path.with_name(path.name + ".lock").open("ab") as lock:
+        for _ in range(_TRIES):
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(_PAUSE)
+        else:
+            raise BlockingIOError(errno.EWOULDBLOCK, "another server holds the audit log")
+        yield
+
+
+def _about(path: Path) -> tuple[int, int]:
+    """By which a file is known that somebody else has written to."""
+    try:
+        about = path.stat()
+    except OSError:
+        return (0, 0)
+    return (about.st_ino, about.st_size)
 
 
 def _lines(path: Path) -> list[Line]:

@@ -29,6 +29,7 @@ class WebConfig:
         port: TCP port.
         tokens_file: JSON of three tokens, made at first start (mode 0600).
         run_dir: Where the mapped files and request sockets of the others are.
+        audit_file: Where it is written down who changed what; outlives a run.
         presets_dir: Where the user's presets are kept.
         machine: `machine_to_mapping` of the machine in use.
         allowed_hosts: Names this server may be asked under, beside its own address.
@@ -42,6 +43,7 @@ class WebConfig:
     port: int
     tokens_file: Path
     run_dir: Path
+    audit_file: Path
     presets_dir: Path
     machine: Mapping[str, Any]
     allowed_hosts: tuple[str, ...] = ()
@@ -123,7 +125,7 @@ def config_from(data: Mapping[str, Any]) -> WebConfig:
         TypeError: A key is missing or unknown.
     """
     values = dict(data)
-    for name in ("tokens_file", "run_dir", "presets_dir", "tls_cert", "tls_key"):
+    for name in ("tokens_file", "run_dir", "audit_file", "presets_dir", "tls_cert", "tls_key"):
         if values.get(name) is not None:
             values[name] = Path(values[name])
     values["allowed_hosts"] = tuple(values.get("allowed_hosts", ()))

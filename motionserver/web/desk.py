@@ -15,6 +15,7 @@ from motionserver.web.auth import Caller, forbidden, unauthorised
 from motionserver.web.config import WebConfig
 from motionserver.web.gate import MAX_BODY, too_large
 from motionserver.web.refusal import Refusal
+from motionserver.web.refusals import Refusals
 from motionserver.web.requests import Peer
 from motionserver.web.tokens import Role
 
@@ -32,6 +33,7 @@ class Desk:
         planner: Takes changes of the tuning.
         presets: Named tunings.
         audit: Who changed what.
+        refusals: Who was refused.
     """
 
     config: WebConfig
@@ -39,6 +41,7 @@ class Desk:
     planner: Peer
     presets: PresetShelf
     audit: Audit
+    refusals: Refusals
 
     def require(self, request: Request, role: Role) -> Caller:
         """Let through who may do this; who it is was found out at the gate.
@@ -54,7 +57,9 @@ class Desk:
         if caller is None:
             raise unauthorised("a token is needed", request.url.path)
         if caller.role < role:
-            raise forbidden(caller.role, role, request.url.path)
+            refusal = forbidden(caller.role, role, request.url.path)
+            self.refusals.note(refusal, request.method, request.url.path, caller)
+            raise refusal
         return caller
 
 

@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from motionserver.web.auth import Doorkeeper
 from motionserver.web.refusal import Refusal
+from motionserver.web.refusals import Refusals
 from motionserver.web.site import READING, check_host, check_site, is_public, single_headers
 
 MAX_BODY: Final = 64 * 1024
@@ -40,6 +41,7 @@ class Gate:
         host_names: Names the server may be asked under, against DNS rebinding.
         doorkeeper: Tells who asks.
         answered: Counts answers by status, for the metrics.
+        refusals: Writes down who was refused.
     """
 
     def __init__(
@@ -49,11 +51,13 @@ class Gate:
         host_names: frozenset[str],
         doorkeeper: Doorkeeper,
         answered: Counter[str],
+        refusals: Refusals,
     ) -> None:
         self._app = app
         self._host_names = host_names
         self._doorkeeper = doorkeeper
         self._answered = answered
+        self._refusals = refusals
         self._open = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -80,6 +84,9 @@ class Gate:
             self._check(scope)
             await self._app(scope, receive, guarded_send)
         except Refusal as refusal:
+            client = scope.get("client")
+            who = client[0] if client else ""
+            self._refusals.note(refusal, scope["method"], scope["path"], who)
             await refusal.response()(scope, receive, guarded_send)
         finally:
             self._open -= 1

@@ -28,7 +28,7 @@ def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
             ssl_keyfile=config.tls_key,
             http=PatientProtocol,
             ws="none",
-            lifespan="off",
+            lifespan="on",
             loop=f"{PatientLoop.__module__}:{PatientLoop.__name__}",
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,

@@ -32,9 +32,10 @@ def side_routes(desk: Desk) -> APIRouter:
         path = request.url.path
         body = await read_json(request)
         _check(body, path)
+        before = (await desk.planner.ask({"op": "side"}, path)).get("engines")
         answer = await desk.planner.ask({"op": "side", "engines": body["engines"]}, path)
         result = "done" if answer.get("ok") else str(answer.get("kind"))
-        desk.audit.note("side", caller, result, engines=body["engines"])
+        desk.audit.note("side", caller, result, old=before, new=body["engines"])
         return _response(answer, path)
 
     return router

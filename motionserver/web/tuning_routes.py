@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any, Final
 
 from fastapi import APIRouter, Request
@@ -10,7 +11,7 @@ from starlette.responses import Response
 
 from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes, default_for, describe
-from motionserver.settings.tuning_presets import Preset
+from motionserver.settings.tuning_presets import Preset, PresetShelf
 from motionserver.web.described import takes_tunables, versioned
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
@@ -39,16 +40,20 @@ def tuning_routes(desk: Desk) -> APIRouter:
         changes = await read_json(request)
         _check(changes, request.url.path)
         asked = {"op": "tune", "if_version": version, "changes": changes}
+        before = await desk.planner.ask({"op": "tuning"}, request.url.path)
         answer = await desk.planner.ask(asked, request.url.path)
-        desk.audit.note("tune", caller, _result(answer), version=version, changes=changes)
+        noted = {"changes": _changed(before, answer)} if answer.get("ok") else {"asked": changes}
+        desk.audit.note("tune", caller, _result(answer), version=version, **noted)
         return _tuning_response(answer, request)
 
     @router.post("/api/tuning/undo", openapi_extra=versioned())
     async def undo(request: Request) -> Response:
         caller = desk.require(request, Role.TUNER)
         version = _if_match(request)
+        before = await desk.planner.ask({"op": "tuning"}, request.url.path)
         answer = await desk.planner.ask({"op": "undo", "if_version": version}, request.url.path)
-        desk.audit.note("undo", caller, _result(answer), version=version)
+        noted = {"changes": _changed(before, answer)} if answer.get("ok") else {}
+        desk.audit.note("undo", caller, _result(answer), version=version, **noted)
         return _tuning_response(answer, request)
 
     @router.get("/api/presets")
@@ -81,6 +86,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
         if not values:
             values = dict((await desk.planner.ask({"op": "tuning"}, path)).get("values") or {})
         _check(values, path)
+        before = _values_of(desk.presets, name)
         try:
             saved = desk.presets.save(name, "Saved from the page.", values)
         except TuningError as error:
@@ -88,7 +94,8 @@ def tuning_routes(desk: Desk) -> APIRouter:
         except OSError as error:
             raise Refusal(507, f"not saved: {error.strerror}", path, "a writable presets directory",
                           "look at the disk") from error  # fmt: skip
-        desk.audit.note("save preset", caller, "done", name=name)
+        changes = differences(before, dict(saved.values))
+        desk.audit.note("save preset", caller, "done", name=name, changes=changes)
         return json_response(_summary(saved) | {"values": saved.values}, 201)
 
     def _check(changes: dict[str, Any], path: str) -> None:
@@ -124,6 +131,32 @@ def _tuning_response(answer: dict[str, Any], request: Request, **more: object) -
 
 def _result(answer: dict[str, Any]) -> str:
     return "done" if answer.get("ok") else str(answer.get("kind"))
+
+
+def _changed(before: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
+    """What a change that was accepted changed; without old values if it was not on top of these."""
+    old = before.get("values") if before.get("ok") else None
+    return differences(old or {}, answer.get("values") or {})
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """The names whose values differ, each with its old value beside the new one.
+
+    A value that was not there, or is there no more, is null.
+    """
+    names = sorted(old.keys() | new.keys())
+    return {
+        name: {"old": old.get(name), "new": new.get(name)}
+        for name in names
+        if old.get(name) != new.get(name)
+    }
+
+
+def _values_of(shelf: PresetShelf, name: str) -> dict[str, Any]:
+    try:
+        return dict(shelf.read(name).values)
+    except (KeyError, TuningError, OSError):
+        return {}
 
 
 def _summary(preset: Preset) -> dict[str, Any]:

@@ -276,6 +276,7 @@ def write_configuration(folder, port, machine, **more):
     tokens.chmod(0o600)
     config = {
         "host": "127.0.0.1", "port": port, "tokens_file": str(tokens), "run_dir": str(folder),
+        "audit_file": str(folder / "audit.jsonl"),
         "presets_dir": str(folder / "presets"), "machine": machine_to_mapping(machine),
         "engage": "http", **more,
     }  # fmt: skip

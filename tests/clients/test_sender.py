@@ -5,6 +5,7 @@ import socket
 import pytest
 from motion_clients import CueSender
 from motion_clients.address import parse_address
+from motion_clients.outage import Outage
 from motion_protocol import (
     Flags,
     Mode,
@@ -108,6 +109,44 @@ def test_sequence_wraps(server):
     with CueSender(address_of(server)) as cue:
         cue._sequence = 2**32 - 1
         assert [cue.send((0.0, 0.0, 0.0)) for _ in range(2)] == [2**32 - 1, 0]
+
+
+def test_a_signed_session_ends_before_its_sequence_wraps(server):
+    with CueSender(address_of(server), key=KEY) as cue:
+        first, cue._sequence = cue.session, 2**32 - 1
+        assert [cue.send((0.0, 0.0, 0.0)) for _ in range(2)] == [2**32 - 1, 0]
+        assert cue.session != first
+    sent = [decode_cue(server.recv(2000), KEY) for _ in range(3)]
+    assert [one.sequence for one in sent] == [2**32 - 1, 0, 1]
+    assert sent[0].session == first
+    assert sent[1].session == sent[2].session == cue.session
+
+
+@pytest.mark.parametrize("key", [KEY, None])
+def test_with_a_key_a_server_that_was_away_is_met_with_a_new_session(key):
+    clock = ManualClock()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = address_of(unused)
+    with CueSender(address, key=key, clock_ns=clock) as cue:
+        sessions = []
+        for _ in range(40):
+            cue.send((0.0, 0.0, 0.0))
+            cue.status()
+            clock.now += 20_000_000
+            sessions.append(cue.session)
+    assert len(set(sessions)) == (2 if key else 1)
+    assert len(set(sessions[:20])) == 1
+
+
+def test_an_outage_is_told_once_and_a_short_one_not_at_all():
+    outage, ms = Outage(), 1_000_000
+    assert not any(outage.refused(k * 100 * ms) for k in range(5))
+    assert outage.refused(500 * ms)
+    assert not any(outage.refused(k * 100 * ms) for k in range(6, 50))
+    assert not outage.refused(60_000 * ms)
+    assert not outage.refused(70_000 * ms)
+    assert outage.refused(71_000 * ms)
 
 
 def test_sender_wants_exactly_one_kind_of_acceleration(server):

@@ -137,9 +137,9 @@ def made(tmp_path, mode):
     [
         (0o600, Level.OK, Level.OK, Level.OK),
         (0o400, Level.OK, Level.OK, Level.OK),
-        (0o640, Level.PROBLEM, Level.WARNING, Level.WARNING),
-        (0o604, Level.PROBLEM, Level.WARNING, Level.PROBLEM),
-        (0o666, Level.PROBLEM, Level.WARNING, Level.PROBLEM),
+        (0o640, Level.PROBLEM, Level.PROBLEM, Level.WARNING),
+        (0o604, Level.PROBLEM, Level.PROBLEM, Level.PROBLEM),
+        (0o666, Level.PROBLEM, Level.PROBLEM, Level.PROBLEM),
     ],
 )
 def test_levels_of_real_files(tmp_path, mode, tokens, secret, tls_key):

@@ -123,6 +123,7 @@ def test_a_game_and_then_zenoh_move_the_platform_and_the_sensor_is_heard(tmp_pat
 def test_a_signed_client_is_answered_and_bye_parks(tmp_path: Path) -> None:
     key = bytes(range(40, 72))
     (tmp_path / "key").write_bytes(key)
+    (tmp_path / "key").chmod(0o600)
     signed = free_port()
     sources = (
         {"kind": "native", "listen": f"127.0.0.1:{signed}", "key_file": str(tmp_path / "key")},

@@ -64,6 +64,7 @@ def test_every_refusal_has_a_name_and_the_drive_goes_on(
 ) -> None:
     signed, beam = free_port(), free_port()
     (tmp_path / "key").write_bytes(KEY)
+    (tmp_path / "key").chmod(0o600)
     sources = (
         {"kind": "native", "listen": f"127.0.0.1:{signed}", "key_file": str(tmp_path / "key")},
         {"kind": "beamng", "listen": f"127.0.0.1:{beam}"},

@@ -186,7 +186,7 @@ def test_engage_and_park_reach_the_guard_and_are_written_down(world):
     for _ in range(2):
         assert world.client("viewer").post("/api/park").json()["ok"] is True
     assert world.asked[0] == {"op": "engage", "by": "http"}
-    text = (world.config.run_dir / "audit.jsonl").read_text()
+    text = world.config.audit_file.read_text()
     lines = [json.loads(line) for line in text.splitlines()]
     assert [x["action"] for x in lines] == ["engage", "engage", "park", "park"]
     assert lines[0]["role"] == "operator"
@@ -417,8 +417,9 @@ def test_side_engines_are_read_and_changed_and_written_down(world):
     answer = world.client("operator").post("/api/side", json={"engines": names})
     assert (answer.status_code, answer.json()["engines"]) == (200, names)
     assert world.asked[-1] == {"op": "side", "engines": names}
-    noted = json.loads((world.config.run_dir / "audit.jsonl").read_text().splitlines()[-1])
-    assert (noted["action"], noted["result"], noted["engines"]) == ("side", "done", names)
+    noted = json.loads(world.config.audit_file.read_text().splitlines()[-1])
+    assert (noted["action"], noted["result"]) == ("side", "done")
+    assert (noted["old"], noted["new"]) == (["classical"], names)
 
 
 @pytest.mark.parametrize(

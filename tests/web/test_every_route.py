@@ -5,7 +5,8 @@ import itertools
 import pytest
 from browser.scene import TOKENS
 from fastapi import APIRouter, FastAPI
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
+from starlette.websockets import WebSocket, WebSocketDisconnect
 from web_world import AWAY, HERE, World, ask_app, every_route
 
 PUBLIC = {"/", "/healthz", "/static/app.js"}
@@ -64,6 +65,55 @@ def test_a_route_that_is_added_is_found_and_closed(world):
     assert world.client(peer=AWAY).get("/api/new").status_code == 401
     assert world.client().post("/api/deep/er").status_code == 401
     assert world.state() == before
+
+
+def test_what_is_mounted_below_is_found_and_closed_streams_and_sockets_too(world):
+    below, deeper = FastAPI(), FastAPI()
+
+    @deeper.post("/change")
+    async def change():
+        world.scene.state = "RUN"
+        return Response()
+
+    @below.get("/stream")
+    async def stream():
+        return StreamingResponse(iter([b"data: 1\n\n"]), media_type="text/event-stream")
+
+    @below.websocket("/socket")
+    async def socket(link: WebSocket):
+        await link.accept()
+
+    below.mount("/deeper", deeper)
+    world.app.mount("/below", below)
+    found = set(paths(world.app))
+    assert {"/below/stream", "/below/socket", "/below/deeper/change"} <= found
+    before = world.state()
+    assert world.client(peer=AWAY).get("/below/stream").status_code == 401
+    assert world.client().post("/below/deeper/change").status_code == 401
+    with (
+        pytest.raises(WebSocketDisconnect),
+        world.client("operator").websocket_connect("/below/socket"),
+    ):
+        pass
+    assert world.state() == before
+
+
+def test_the_stream_is_closed_to_strangers_and_open_to_a_viewer(world):
+    stranger = world.client(peer=AWAY)
+    assert stranger.get("/api/stream").status_code == 401
+    assert stranger.get("/api/stream", headers={"accept": "text/event-stream"}).status_code == 401
+    assert "/api/stream" in paths(world.app)
+
+
+def test_no_file_outside_the_folder_is_served(world):
+    for path in (
+        "/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2f..%2fweb/auth.py",
+        "/static/%2e%2e%2f%2e%2e%2f%2e%2e%2fpyproject.toml", "/static//etc/passwd",
+        "/static/\\..\\app.py", "/static/%00", "/static/", "/static/vendor", "/static",
+    ):  # fmt: skip
+        answer = world.client(peer=AWAY).get(path, follow_redirects=False)
+        assert answer.status_code in (401, 404), (path, answer.status_code)
+        assert b"import" not in answer.content
 
 
 def test_strangers_from_elsewhere_get_nothing_but_page_and_health(world):

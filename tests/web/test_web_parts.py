@@ -25,7 +25,8 @@ STATIC = files("motionserver.web").joinpath("static")
 
 def config(folder, **more):
     values = {"host": "127.0.0.1", "port": 0, "tokens_file": folder / "t.json", **more}
-    return WebConfig(run_dir=folder, presets_dir=folder / "p", machine={}, **values)
+    paths = {"run_dir": folder, "audit_file": folder / "a", "presets_dir": folder / "p"}
+    return WebConfig(machine={}, **paths, **values)
 
 
 class Counted:
