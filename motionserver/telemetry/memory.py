@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import resource
 from pathlib import Path
 from typing import Final
@@ -41,7 +42,9 @@ def lock_memory(wanted: bool) -> str:
     limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     try:
         if libc.mlockall(_CURRENT) != 0:
-            return f"memory not locked: RLIMIT_MEMLOCK is {limit >> 20} MiB"
+            why = os.strerror(ctypes.get_errno())
+            allowed = "unlimited" if limit == unlimited else f"{limit >> 20} MiB"
+            return f"memory not locked ({why}; RLIMIT_MEMLOCK is {allowed})"
         # under a limit memory asked for later would be refused, unless we were just excused from it
         if limit != unlimited and _locked() <= limit:
             return "memory locked as of the start"
