@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import resource
 from pathlib import Path
 from typing import Final
@@ -10,6 +11,8 @@ from typing import Final
 _CURRENT, _FUTURE = 1, 2
 _TRIM, _MAP_ABOVE = -1, -3
 """Options of glibc's mallopt: how much free memory to keep, and what size to map apart."""
+_STACK: Final = 16 << 20
+"""Room a growing stack needs below the limit [bytes]."""
 _ALL: Final = 0x7FFFFFFF
 _LARGEST: Final = 32 << 20
 """What glibc allows for the size from which a block is mapped apart [bytes]."""
@@ -41,10 +44,16 @@ def lock_memory(wanted: bool) -> str:
     limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     try:
         if libc.mlockall(_CURRENT) != 0:
-            return f"memory not locked: RLIMIT_MEMLOCK is {limit >> 20} MiB"
+            why = os.strerror(ctypes.get_errno())
+            allowed = "unlimited" if limit == unlimited else f"{limit >> 20} MiB"
+            return f"memory not locked ({why}; RLIMIT_MEMLOCK is {allowed})"
         # under a limit memory asked for later would be refused, unless we were just excused from it
-        if limit != unlimited and _locked() <= limit:
-            return "memory locked as of the start"
+        if limit != unlimited and (room := limit - _locked()) >= 0:
+            if room >= _STACK:
+                return "memory locked as of the start"
+            # a locked stack that may not grow ends the process
+            libc.munlockall()
+            return f"memory not locked (RLIMIT_MEMLOCK of {limit >> 20} MiB leaves no room)"
         later = libc.mlockall(_CURRENT | _FUTURE) == 0
     except AttributeError:
         return "memory not locked: no mlockall here"

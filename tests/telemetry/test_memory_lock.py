@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from motionserver.telemetry import memory
+
 ROOT = Path(__file__).parent.parent.parent
 SCENE = """
 import ctypes, resource, sys
@@ -47,7 +49,9 @@ def test_not_wanted_is_not_done() -> None:
 
 
 def test_refused_is_told_with_the_limit() -> None:
-    assert run(1 << 20, drop=True) == ("memory not locked: RLIMIT_MEMLOCK is 1 MiB", 0)
+    said, locked = run(1 << 20, drop=True)
+    assert re.fullmatch(r"memory not locked \(.+; RLIMIT_MEMLOCK is 1 MiB\)", said)
+    assert locked == 0
 
 
 def test_under_a_limit_memory_asked_for_later_is_still_had() -> None:
@@ -66,6 +70,57 @@ def test_with_the_capability_everything_is_locked() -> None:
     said, locked = run(1 << 20, drop=False)
     assert said == "memory locked"
     assert locked >= 64
+
+
+class Kernel:
+    """A C library that grants or refuses, and remembers what is locked."""
+
+    def __init__(self, *refuses: int) -> None:
+        self.refuses = refuses
+        self.flags: list[int] = []
+
+    def mlockall(self, flags: int) -> int:
+        self.flags.append(flags)
+        return -1 if flags in self.refuses else 0
+
+    def munlockall(self) -> int:
+        self.flags.append(0)
+        return 0
+
+    def mallopt(self, option: int, value: int) -> int:
+        return 1
+
+
+@pytest.mark.parametrize(
+    ("limit", "locked", "refuses", "said", "flags"),
+    [
+        (-1, 100, (), "memory locked", [1, 3]),
+        (-1, 100, (3,), "memory locked as of the start", [1, 3]),
+        (-1, 0, (1,), "memory not locked (Success; RLIMIT_MEMLOCK is unlimited)", [1]),
+        (200, 100, (), "memory locked as of the start", [1]),
+        (116, 100, (), "memory locked as of the start", [1]),
+        (115, 100, (), "memory not locked (RLIMIT_MEMLOCK of 115 MiB leaves no room)", [1, 0]),
+        (100, 100, (), "memory not locked (RLIMIT_MEMLOCK of 100 MiB leaves no room)", [1, 0]),
+        (8, 100, (), "memory locked", [1, 3]),
+    ],
+)
+def test_what_a_limit_leaves(
+    monkeypatch: pytest.MonkeyPatch,
+    limit: int,
+    locked: int,
+    refuses: tuple[int, ...],
+    said: str,
+    flags: list[int],
+) -> None:
+    kernel = Kernel(*refuses)
+    bytes_of = limit if limit < 0 else limit << 20
+    monkeypatch.setattr(memory.ctypes, "CDLL", lambda *_, **__: kernel)
+    monkeypatch.setattr(memory.ctypes, "get_errno", lambda: 0)
+    monkeypatch.setattr(memory.resource, "getrlimit", lambda _: (bytes_of, bytes_of))
+    monkeypatch.setattr(memory.resource, "setrlimit", lambda *_: None)
+    monkeypatch.setattr(memory, "_locked", lambda: locked << 20)
+    assert memory.lock_memory(True) == said
+    assert kernel.flags == flags
 
 
 def _may_lock() -> bool:
