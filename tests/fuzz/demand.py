@@ -11,10 +11,10 @@ def must(right, what):
     assert right, what
 
 
-def words(error, *needed):
+def words(error, *needed, most=500):
     """An error must be of use: not empty, not endless, and naming what it is about."""
     text = str(error)
-    assert 15 <= len(text) <= 500, f"message of {len(text)} characters: {text[:200]}"
+    assert 15 <= len(text) <= most, f"message of {len(text)} characters: {text[:200]}"
     for one in needed:
         assert one in text, f"{one!r} is not named in {text!r}"
 

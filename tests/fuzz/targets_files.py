@@ -61,7 +61,8 @@ def config(data):
         must(len(error.where) > 4, "no place is named")
         must(error.what, "nothing is said about what is wrong")
         must(error.do, "nothing is said about what to do")
-        words(error)
+        # what somebody typed may be shown, once or twice
+        words(error, most=1000 + 4 * len(data))
         return False
     told_keys = tomllib.loads(path.read_text("utf-8"))
     assert set(told_keys) <= SECTIONS, "an unknown key is taken"
