@@ -58,8 +58,12 @@ class Mutator:
             return rng.randbytes(
                 rng.choice((0, 1, 25, 32, 40, 41, 44, 88, 92, rng.randrange(1300)))
             )
-        data = bytearray(rng.choice(self.seeds))
-        for _ in range(1 if dice < 0.7 else rng.randrange(2, 7)):
+        return self.change(rng.choice(self.seeds), 1 if dice < 0.7 else rng.randrange(2, 7))
+
+    def change(self, packet, times):
+        """Do so many things to a packet, and make it whole again, mostly."""
+        data, rng = bytearray(packet), self.rng
+        for _ in range(times):
             data = rng.choice(self._ways)(data)
         if self.shape.mend is not None and rng.random() < 0.75:
             data = self.shape.mend(data, rng)

@@ -85,18 +85,30 @@ def guided(name, seconds, folder, extra):
     with atheris.instrument_imports(
         include=["motion_protocol", "motion_clients", "motionserver", "tomllib", "json"]
     ):
+        from mutate import Mutator
         from targets import TARGETS
     quiet()
     target = TARGETS[name]
     folder.mkdir(parents=True, exist_ok=True)
     for label, data in target.corpus():
         (folder / label).write_bytes(data)
-    arguments = [sys.argv[0], str(folder), f"-max_total_time={seconds}", "-max_len=4200"]
+    seeds = [data for _, data in target.corpus()]
+    arguments = [sys.argv[0], str(folder), f"-max_total_time={seconds}", *extra]
+    arguments += [f"-artifact_prefix={folder.parent}/{name}-"]
+    arguments += [f"-max_len={64 + max(map(len, seeds))}"]
+    mutator = Mutator(target.shape, seeds, name)
 
     def once(data):
         target.check(data)
 
-    atheris.Setup([*arguments, f"-artifact_prefix={folder.parent}/{name}-", *extra], once)
+    def change(data, longest, seed):
+        # what atheris sees in comparisons, and what only the shape of the format can mend
+        mutator.rng.seed(seed)
+        if mutator.rng.random() < 0.4:
+            return atheris.Mutate(data, longest)
+        return mutator.change(data, mutator.rng.randrange(1, 4))[:longest]
+
+    atheris.Setup(arguments, once, custom_mutator=change)
     atheris.Fuzz()
 
 
