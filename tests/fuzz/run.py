@@ -16,6 +16,24 @@ for one in (ROOT, ROOT / "protocol", ROOT / "clients", ROOT / "tests", HERE):
     sys.path.insert(0, str(one))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 BATCH = 50_000
+WATCHED = [
+    "motion_protocol",
+    "motion_clients.moog_wire",
+    "motion_clients.moog_device",
+    "motion_clients.moog_machine",
+    "motionserver.core.intake",
+    "motionserver.core.plan",
+    "motionserver.core.safety.will",
+    "motionserver.platforms",
+    "motionserver.planner.inputs",
+    "motionserver.settings",
+    "motionserver.sources",
+    "motionserver.telemetry.link",
+    "motionserver.telemetry.mapped",
+    "motionserver.telemetry.requests",
+    "tomllib",
+]
+"""What atheris looks into."""
 
 
 def campaign(names, packets, seed, found_dir, log):
@@ -82,9 +100,7 @@ def guided(name, seconds, folder, extra):
     """Let atheris search; new inputs gather in ``folder``."""
     import atheris
 
-    with atheris.instrument_imports(
-        include=["motion_protocol", "motion_clients", "motionserver", "tomllib", "json"]
-    ):
+    with atheris.instrument_imports(include=WATCHED):
         from mutate import Mutator
         from targets import TARGETS
     quiet()
