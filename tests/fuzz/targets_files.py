@@ -95,7 +95,9 @@ def machine(data):
         assert value is None or (math.isfinite(value) and value > 0), f"{name} = {value}"
     text = json.dumps(machine_to_mapping(found), allow_nan=False)
     assert machine_to_mapping(machine_from_mapping(json.loads(text))) == json.loads(text)
-    assert found.pace.speed <= found.leg_speed
+    for name in ("speed", "acceleration", "jerk"):
+        pace, limit = getattr(found.pace, name), getattr(found, f"leg_{name}")
+        assert limit is None or pace <= 0.9 * limit, f"a pace of {pace}, legs do {limit}"
     return True
 
 
