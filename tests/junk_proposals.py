@@ -10,6 +10,7 @@ import struct
 from collections import Counter
 from itertools import pairwise
 
+import numpy as np
 from proposals import Proposer
 
 from motionserver.core.plan import pack, unpack
@@ -60,7 +61,8 @@ class Junk:
         kind: Of the newest; "genuine" for a plan that may be taken.
     """
 
-    def __init__(self, machine, seed):
+    def __init__(self, machine, seed, every=EVERY, lead=LEAD):
+        self._every, self._lead = every, lead
         self.rng = random.Random(seed)
         self.made = Counter()
         self.unreadable = 0
@@ -71,19 +73,16 @@ class Junk:
         self._plan = None
         self._old = b""
         self._clock = 0.0
-        self._earliest = 0.0
+        self._parent = None
 
     def __call__(self, playback):
         """What the guard finds in the planner's file: a plan, or None if it is unreadable."""
         self._clock = playback.newest_clock
-        self._earliest = max(self._clock, 0.0)
-        step, self._step = self._step, (self._step + 1) % EVERY
+        self._parent = playback.newest.plan
+        step, self._step = self._step, (self._step + 1) % self._every
         if step == 0 or self._plan is None:
-            parent = playback.newest.plan
-            takeover = max(self._clock + LEAD, 0.004)
-            self._genuine._number += 1
-            self._plan = pack(self._genuine._gentle(parent, takeover))
-        if step == EVERY - 1:
+            self._plan = bytes(self._continued(max(self._clock + self._lead, 0.004)))
+        if step == self._every - 1:
             self.kind, data = "genuine", self._plan
             self._old = data
         else:
@@ -153,10 +152,16 @@ class Junk:
         return bytearray(self._old) or self._wrong_parent(data)
 
     def _late(self, data):
-        return self._take_over(data, self._earliest - 10.0 ** self.rng.uniform(-6, 3))
+        """Continues its parent as it should, at an instant that has passed."""
+        if self._clock > 0.0035 and self.rng.random() < 0.5:
+            return self._continued(self.rng.uniform(0.0031, self._clock - 1e-6))
+        return self._take_over(data, max(self._clock, 0.0) - 10.0 ** self.rng.uniform(-6, 3))
 
     def _early(self, data):
-        return self._take_over(data, self._clock + 0.5 + 10.0 ** self.rng.uniform(-6, 3))
+        wait = 0.5 + 10.0 ** self.rng.uniform(-6, 3)
+        if self.rng.random() < 0.5:
+            return self._continued(max(self._clock, 0.0) + wait)
+        return self._take_over(data, self._clock + wait)
 
     def _jump(self, data):
         """Larger than any tolerance of the hand-over; at times as large as the platform."""
@@ -182,14 +187,16 @@ class Junk:
         return self._retimed(data, times)
 
     def _too_close(self, data):
-        """The first step may be 0.1 ms, every later one 8 ms."""
-        times = self._times(data)
+        """One knot more, on the same way; the first step may be 0.1 ms, every later one 8 ms."""
+        times, plan = self._times(data), unpack(self._plan)
         row = self.rng.randrange(len(times) - 1)
-        least = 1e-4 if row == 0 else 0.008
-        end = times[row] + self.rng.uniform(0.0, 0.99) * least
-        moved = times[row + 1] - end
-        rest = [time - moved for time in times[row + 1 :]]
-        return self._retimed(data, times[: row + 1] + rest)
+        least = min(1e-4 if row == 0 else 0.008, times[row + 1] - times[row])
+        time = times[row] + self.rng.uniform(0.05, 0.95) * least
+        tables = plan.evaluate(np.array([time]))
+        struct.pack_into("<I", data, 24, len(times) + 1)
+        at = HEAD + ROW * (row + 1)
+        data[at:at] = struct.pack("<19d", time, *(value for table in tables for value in table[0]))
+        return data
 
     def _begins_late(self, data):
         return self._put(data, 0, 0, self._sign(10.0 ** self.rng.uniform(-12, -1)))
@@ -214,6 +221,11 @@ class Junk:
                 at = at // 8 * 8
                 data[at : at + 8] = data[at : at + 8][::-1]
         return data
+
+    def _continued(self, takeover):
+        """A genuine plan that takes over at ``takeover`` [s]."""
+        self._genuine._number += 1
+        return bytearray(pack(self._genuine._gentle(self._parent, takeover)))
 
     # How a plan is written: 32 bytes, then rows of time, pose, velocity, acceleration.
 

@@ -129,13 +129,16 @@ class Followed(Executed):
         return np.concatenate(pieces)
 
 
-def propose_junk(seed, count):
-    bench = Bench(compact(), plan_period=0.2).engaged()
+def propose_junk(seed, count, slices=0):
+    """Junk at every tick; with slices a check takes ten ticks, and so does the next proposal."""
+    bench = Bench(compact(), plan_period=0.2, slices=slices).engaged()
     bench.plan, bench.plan_every = Junk(bench.machine, seed), 1
+    if slices:
+        bench.plan, bench.plan_every = Junk(bench.machine, seed, every=4, lead=0.25), 12
     start = bench.record.counters.copy()
     executed = Followed(bench)
     begin = time.process_time()
-    for _ in range(count):
+    for _ in range(count * bench.plan_every):
         executed.tick()
     junk = bench.plan
     assert set(bench.seen[4:]) <= {"RUN"}
@@ -160,7 +163,11 @@ def hold_junk_to_account(found):
 
 
 def test_some_thousand_pieces_of_junk():
-    hold_junk_to_account(propose_junk(seed=7, count=8_000))
+    hold_junk_to_account(propose_junk(seed=7, count=5_000))
+
+
+def test_junk_checked_in_slices():
+    hold_junk_to_account(propose_junk(seed=8, count=500, slices=1))
 
 
 @pytest.mark.campaign
