@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_settings import (
     BaseSettings,
     PydanticBaseSettingsSource,
@@ -16,8 +23,20 @@ from pydantic_settings import (
 )
 
 from motionserver.errors import ConfigError
-from motionserver.settings.problems import config_error
+from motionserver.settings.problems import config_error, read_toml, unknown_key
 
+
+def _usable(value: str) -> str:
+    if "\0" in value:
+        raise ValueError("a path cannot hold the character NUL")
+    try:
+        Path(value).expanduser()
+    except RuntimeError:
+        raise ValueError("no user of the name behind ~ exists; give the whole path") from None
+    return value
+
+
+FilePath = Annotated[str, AfterValidator(_usable)]
 Port = Annotated[int, Field(ge=1, le=65535)]
 AnyPort = Annotated[int, Field(ge=0, le=65535)]
 Arm = Annotated[float, Field(allow_inf_nan=False, ge=-10.0, le=10.0)]
@@ -33,8 +52,8 @@ class Strict(BaseModel):
 class ServerSection(Strict):
     """[server]."""
 
-    run_dir: str = ""
-    state_dir: str = ""
+    run_dir: FilePath = ""
+    state_dir: FilePath = ""
     log_level: Literal["debug", "info", "warning"] = "info"
     realtime: bool = True
     blackbox_kept: Annotated[int, Field(ge=0, le=1000)] = 20
@@ -44,7 +63,7 @@ class PlatformSection(Strict):
     """[platform]: the machine and its packets."""
 
     format: str = "moog-6dof2000e"
-    preset: str = "t2-compact"
+    preset: FilePath = "t2-compact"
     mode: Literal["length", "dof"] = "length"
     host: str = "127.0.0.1"
     port: Port = 991
@@ -70,10 +89,10 @@ class SourceSection(Strict):
 
     kind: Literal["native", "beamng", "zenoh", "imu"] = "native"
     listen: str = "127.0.0.1:4600"
-    key_file: str = ""
+    key_file: FilePath = ""
     topic: str = "motion/0/in/cue"
     preview_topic: str = ""
-    zenoh_config: str = ""
+    zenoh_config: FilePath = ""
     connect: list[str] = Field(default_factory=list)
     allow_unsigned: bool = False
 
@@ -115,7 +134,7 @@ class OperatorSection(Strict):
     """[operator]: who may engage."""
 
     engage: Literal["console", "http", "auto"] = "console"
-    enable_input: str = ""
+    enable_input: FilePath = ""
 
 
 class WebSection(Strict):
@@ -124,9 +143,9 @@ class WebSection(Strict):
     enabled: bool = True
     host: str = "127.0.0.1"
     port: AnyPort = 8080
-    tokens_file: str = ""
-    tls_cert: str = ""
-    tls_key: str = ""
+    tokens_file: FilePath = ""
+    tls_cert: FilePath = ""
+    tls_key: FilePath = ""
     allowed_hosts: list[str] = Field(default_factory=list)
 
 
@@ -168,8 +187,9 @@ def split_address(text: str) -> tuple[str, int]:
         ValueError: It is not host:port, or the port is not 0..65535.
     """
     host, _, port = text.rpartition(":")
-    if not host or not port.isdigit() or int(port) > 65535:
-        raise ValueError(f"{text!r} is not HOST:PORT, for example 127.0.0.1:4600")
+    digits = port.isascii() and port.isdigit() and len(port) <= 5
+    if not host or not digits or int(port) > 65535:
+        raise ValueError(f"{text[:60]!r} is not HOST:PORT, for example 127.0.0.1:4600")
     return host.strip("[]"), int(port)
 
 
@@ -188,13 +208,17 @@ def load_config(path: Path | None, overrides: Mapping[str, Any] | None = None) -
     if path is not None:
         try:
             text = path.read_text("utf-8")
-            data = _merged(tomllib.loads(text), data)
         except OSError as error:
             raise ConfigError(
                 str(path), f"cannot be read ({error.strerror})", "Give the path of a TOML file."
             ) from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except UnicodeDecodeError as error:
             raise ConfigError(str(path), f"not TOML: {error}", "Correct the syntax.") from error
+        data = _merged(read_toml(text, str(path)), data)
+    # pydantic-settings would take them for its own options, and look for values elsewhere
+    for key in data:
+        if key.startswith("_"):
+            raise unknown_key(f"{path}: {key}", key, sorted(Config.model_fields))
     try:
         return Config(**data)
     except ValidationError as error:

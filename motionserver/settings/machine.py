@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +14,7 @@ from motionserver.core.kinematics.hexapod import neutral_conditioning
 from motionserver.core.limits import Machine, Pace
 from motionserver.core.safety.verify import GUARD_MARGINS, check_ways_home
 from motionserver.errors import ConfigError
-from motionserver.settings.problems import config_error
+from motionserver.settings.problems import config_error, read_toml
 
 PACE_SHARE = 0.9
 """Most of a leg limit that raising and parking may use: a move must pass the same check."""
@@ -91,8 +90,8 @@ def load_machine(name: str) -> Machine:
     if name.endswith(".toml"):
         try:
             text = path.read_text("utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else "not UTF-8 text, or no path"
             raise ConfigError(
                 name, f"cannot be read ({why})", "Give the path of a machine file."
             ) from error
@@ -115,9 +114,7 @@ def parse_machine(text: str, path: Path) -> Machine:
         ConfigError: As `load_machine`.
     """
     try:
-        data = _MachineFile.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(str(path), f"not TOML: {error}", "Correct the syntax.") from error
+        data = _MachineFile.model_validate(read_toml(text, str(path)))
     except ValidationError as error:
         raise config_error(error, path, text, _MachineFile) from error
     angle = data.workspace.joint_angle_deg

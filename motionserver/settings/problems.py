@@ -4,11 +4,43 @@ from __future__ import annotations
 
 import difflib
 import re
+import tomllib
 from pathlib import Path
+from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
 from motionserver.errors import ConfigError
+
+_SHOWN: Final = 80
+"""Most characters of a wrong value that are shown."""
+
+
+def read_toml(text: str, where: str) -> dict[str, Any]:
+    """Read TOML, whatever stands in it.
+
+    Args:
+        text: What to read.
+        where: The file, for the error.
+
+    Raises:
+        ConfigError: It is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ConfigError(
+            where, "not TOML: brackets nested too deeply", "Correct the syntax."
+        ) from None
+    except ValueError as error:  # a number of thousands of digits is no TOMLDecodeError
+        raise ConfigError(where, f"not TOML: {error}", "Correct the syntax.") from error
+
+
+def unknown_key(where: str, key: str, known: list[str], tail: str = "") -> ConfigError:
+    """Word the refusal of a key that does not exist, with the most similar one that does."""
+    close = difflib.get_close_matches(key, known, 1)
+    hint = f"Did you mean {close[0]!r}?" if close else f"Allowed: {', '.join(known)}."
+    return ConfigError(where, f"unknown key {key!r}", hint + tail)
 
 
 def config_error(
@@ -33,12 +65,9 @@ def config_error(
     more = len(error.errors()) - 1
     tail = f" ({more} more after this one)" if more else ""
     if first["type"] == "extra_forbidden":
-        known = _known(model, keys[:-1])
-        close = difflib.get_close_matches(keys[-1], known, 1)
-        hint = f"Did you mean {close[0]!r}?" if close else f"Allowed: {', '.join(known)}."
-        return ConfigError(where, f"unknown key {keys[-1]!r}", hint + tail)
+        return unknown_key(where, keys[-1], _known(model, keys[:-1]), tail)
     found = first.get("input")
-    shown = "" if isinstance(found, dict | list) else f", found {found!r}"
+    shown = "" if isinstance(found, dict | list) else f", found {repr(found)[:_SHOWN]}"
     return ConfigError(where, f"{first['msg']}{shown}", f"Correct this value.{tail}")
 
 

@@ -132,7 +132,7 @@ def _source(source: SourceSection) -> dict[str, Any]:
             "nobody else can reach.",
         )
     secure = str(Path(source.zenoh_config).expanduser()) if source.zenoh_config else ""
-    if secure and not Path(secure).is_file():
+    if secure and not _is_file(Path(secure)):
         raise ConfigError(
             f"{where}: zenoh_config", f"{secure}: no such file", "Give Zenoh's configuration."
         )
@@ -146,6 +146,13 @@ def _source(source: SourceSection) -> dict[str, Any]:
         "preview_topic": source.preview_topic,
         "zenoh_config": secure,
     }
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that is too long, or a folder that may not be entered
+        return False
 
 
 def _is_loopback(host: str) -> bool:

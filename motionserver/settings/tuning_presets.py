@@ -117,7 +117,7 @@ class PresetShelf:
 def _parsed(name: str, text: str, *, built_in: bool) -> Preset:
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise _error(name, str(error)[:120], "a TOML file", "not a preset") from None
     about, values = data.get("about", ""), data.get("values")
     if not isinstance(about, str) or not isinstance(values, dict):

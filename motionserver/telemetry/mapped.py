@@ -18,6 +18,8 @@ _HEAD: Final = struct.Struct("<II")
 SLOT: Final = struct.Struct("<QII")
 """Before every message: its sequence, its length, `crc_of` both."""
 _ATTEMPTS: Final = 4
+_ENDLESS: Final = 1 << 63
+"""No writer lives until this sequence, and there must be room to go on."""
 
 
 def crc_of(sequence: int, data: bytes) -> int:
@@ -69,6 +71,10 @@ class MappedFile:
         # go on after the newest whole message: a torn header must not turn us onto its slot
         newest = self.read()
         self._sequence = self.newest_sequence() if newest is None else newest[0]
+        if self._sequence >= _ENDLESS:
+            raise ValueError(
+                f"{path}: sequence {self._sequence} was never written; remove it and start again"
+            )
 
     @staticmethod
     def _create(path: Path, capacity: int) -> None:

@@ -1,3 +1,5 @@
+import re
+
 import pytest
 
 from motionserver.errors import ConfigError
@@ -82,6 +84,30 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match="not TOML"):
         load_config(tmp_path / "b.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a = " + "[" * 3000, "not TOML: brackets nested too deeply"),
+        ("[web]\nport = " + "9" * 5000, "not TOML: Exceeds the limit"),
+        ("_env_file = '/dev/null'", "unknown key '_env_file'"),
+        ("_cli_parse_args = true", "unknown key '_cli_parse_args'"),
+        ("__pydantic_self__ = 1", "unknown key '__pydantic_self__'"),
+        ('[platform]\npreset = "a\\u0000.toml"', "platform.preset: .* NUL"),
+        ('[[sources]]\nkey_file = "a\\u0000"', "key_file: .* NUL"),
+        ('[server]\nrun_dir = "~nobody-here/x"', "server.run_dir: .* no user"),
+        ('[[sources]]\nkey_file = "~nobody-here/x"', "key_file: .* no user"),
+        ('[[sources]]\nlisten = "127.0.0.1:²"', "HOST:PORT"),
+        ('[[sources]]\nlisten = "127.0.0.1:٤٦"', "HOST:PORT"),
+        (f'[[sources]]\nlisten = "127.0.0.1:{"9" * 5000}"', "HOST:PORT"),
+    ],
+)
+def test_what_nobody_writes_by_mistake(tmp_path, text, expected):
+    message = str(wrong(tmp_path, text))
+    assert re.search(expected, message)
+    assert "c.toml" in message
+    assert len(message) < 400
 
 
 def test_overrides_leave_their_neighbours_alone(tmp_path):

@@ -148,6 +148,17 @@ def test_a_machine_travels_as_json(machine):
         back.box[0] = 9.0
 
 
+@pytest.mark.parametrize("text", ["a = " + "[" * 3000, "a = " + "9" * 5000])
+def test_what_no_reader_of_toml_bears(text):
+    with pytest.raises(ConfigError, match=r"m\.toml: not TOML"):
+        parse_machine(text, Path("m.toml"))
+
+
+def test_a_name_that_is_no_path():
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_machine("a\0.toml")
+
+
 def test_a_pose_in_words():
     text = describe_pose(np.array([0.1, 0, -0.2, np.pi / 180, 0, 0]))
     assert text.startswith("surge +100.0 mm, sway +0.0 mm, heave -200.0 mm, roll +1.00 deg")

@@ -45,7 +45,17 @@ def test_number_of_saved_presets_is_bounded(tmp_path):
     shelf.save("p1", "", {"scale": 0.2})
 
 
-@pytest.mark.parametrize("text", ["{", "values = 3", "about = 1\n[values]\n", "[values]\nscale=7"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "values = 3",
+        "about = 1\n[values]\n",
+        "[values]\nscale=7",
+        "a = " + "[" * 3000,
+        "[values]\nscale = " + "9" * 5000,
+    ],
+)
 def test_a_broken_file_is_named(tmp_path, text):
     (tmp_path / "broken.toml").write_text(text)
     with pytest.raises(TuningError):

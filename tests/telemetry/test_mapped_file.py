@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.mapped import MappedFile, crc_of
 
 SLOT = struct.Struct("<QII")
 
@@ -121,7 +121,7 @@ def test_another_capacity_is_refused(path):
 CHILD = """
 import sys
 from pathlib import Path
-from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.mapped import MappedFile, crc_of
 file = MappedFile(Path(sys.argv[1]))
 print("up", flush=True)
 number = 0
@@ -179,3 +179,16 @@ def test_readers_and_writers_may_be_killed_at_any_instant(path):
     own = MappedFile(path)
     own.write(b"still here")
     assert reader.read() == (own.newest_sequence(), b"still here")
+
+
+@pytest.mark.parametrize("crc", ["right", "torn"])
+def test_a_sequence_that_leaves_no_room_is_refused(path, crc):
+    last = (1 << 64) - 1
+    MappedFile(path, 8).write(b"x")
+    data = bytearray(path.read_bytes())
+    checked = crc_of(last, b"x") if crc == "right" else 0
+    data[8:32] = SLOT.pack(last, 1, checked) + b"x".ljust(8, b"\0")
+    data[32:] = bytes(24)
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match="was never written; remove it"):
+        MappedFile(path)
