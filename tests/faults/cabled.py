@@ -1,19 +1,17 @@
 """Simulator, server and base in three network namespaces, with cables that can be pulled."""
 
 import contextlib
-import json
 import os
-import signal
 import subprocess
 import time
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from rig import PATIENCE, Rig, command, environment, until
+from far_ends import FarBase, FarRig
 
 SIM, SERVER_TO_SIM = "10.83.1.1", "10.83.1.2"
 SERVER_TO_BASE, BASE = "10.83.2.1", "10.83.2.2"
-CUES = 4600
+CUES = f"{SERVER_TO_SIM}:4600"
 BASE_PORT = 991
 SIDES = {"server": ("server", "to_base"), "base": ("base", "base0"), "simulator": ("sim", "sim0")}
 """Where a cable can be pulled: namespace and device."""
@@ -82,79 +80,18 @@ class Cables:
             ip("-n", self._names[who], "link", "set", device, "up")
 
 
-class CabledBase:
-    """`motionserver emulate` at the far end; what it wrote down is the verdict."""
-
-    port = BASE_PORT
-
-    def __init__(self, cables: Cables, folder: Path) -> None:
-        self._summary, self.log = folder / "verdict.json", folder / "base.log"
-        form = ("moog-6dof2000e", "--listen", f"{BASE}:{BASE_PORT}", "--may-lose")
-        files = ("--summary", str(self._summary), "--log", str(self.log))
-        self._command = [*cables.within("base"), *command("emulate", *form, *files)]
-
-    def start(self) -> None:
-        self._process = subprocess.Popen(
-            self._command, env=environment(), stdout=subprocess.DEVNULL, start_new_session=True
-        )
-        table = Path(f"/proc/{self._process.pid}/net/udp")
-        until(lambda: f":{BASE_PORT:04X} " in table.read_text("ascii"), "the base to listen")
-
-    def stop(self) -> dict[str, Any]:
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGTERM)
-            self._process.wait(PATIENCE)
-        verdict: dict[str, Any] = json.loads(self._summary.read_text("utf-8"))
-        return verdict
-
-
-class CabledRig(Rig):
+class CabledRig(FarRig):
     """A server between a simulator and a base, each behind a cable."""
 
     def __init__(self, cables: Cables, folder: Path) -> None:
         self.cables = cables
-        self._simulators: list[subprocess.Popen[bytes]] = []
-        cues = {"kind": "native", "listen": f"{SERVER_TO_SIM}:{CUES}", "allow_unsigned": True}
+        cues = {"kind": "native", "listen": CUES, "allow_unsigned": True}
         super().__init__(
             folder,
             {"platform": {"host": BASE, "local_host": SERVER_TO_BASE}},
+            base=FarBase(folder, (BASE, BASE_PORT), cables.within("base"), may_lose=True),
+            sim_within=cables.within("sim"),
+            cues_to=CUES,
             sources=(cues,),
-            base=CabledBase(cables, folder),
             within=cables.within("server"),
         )
-
-    def drive(self, recording: str = "truck_brake_accel", *_: Any, **__: Any) -> Any:
-        """Let a simulator at the far end replay a recording for ever."""
-        words = command("replay", recording, "--to", f"{SERVER_TO_SIM}:{CUES}", "--loop")
-        self._simulators.append(
-            subprocess.Popen(
-                [*self.cables.within("sim"), *words],
-                env=environment(),
-                stdout=subprocess.DEVNULL,
-                start_new_session=True,
-            )
-        )
-
-    def __exit__(self, *info: object) -> None:
-        for simulator in self._simulators:
-            simulator.kill()
-            simulator.wait(PATIENCE)
-        super().__exit__(*info)
-
-    def drives_again(self) -> None:
-        """An operator's hands: reset, engage, until it runs."""
-
-        def runs() -> bool:
-            state = self.state
-            if state in ("FAULT", "SAFE"):
-                self._try("reset")
-            elif state == "PARKED":
-                self._try("engage")
-            return state == "RUN" and self.is_moving()
-
-        self.wait_for(runs, "driving again")
-
-    def _try(self, op: str) -> None:
-        with contextlib.suppress(OSError):
-            self.ask(op)
-        time.sleep(0.1)

@@ -12,6 +12,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from far_ends import FarRig
 from process_hands import is_loaded, kill, replaced, rounds
 from rig import Rig, assert_soft, cli, command, environment
 from setpoint_log import STEP, largest_step, spread
@@ -151,7 +152,7 @@ def test_a_full_disk_costs_words_and_no_motion(tmp_path: Path, disk: Disk) -> No
 @pytest.mark.timeout(3600)
 def test_the_disk_fills_again_and_again(tmp_path: Path, disk: Disk) -> None:
     random, figures = Random(451), []
-    with Rig(on(disk, tmp_path), web=True) as rig:
+    with FarRig(on(disk, tmp_path), web=True) as rig:
         rig.run()
         disk.free_again()
         rig.wait_for(lambda: rig.pid("web"), "the page")

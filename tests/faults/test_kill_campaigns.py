@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import signal
 import sys
 import time
@@ -11,8 +12,9 @@ from random import Random
 from typing import Any
 
 import pytest
+from far_ends import FarRig
 from process_hands import is_loaded, kill, replaced, rounds
-from rig import Rig, assert_soft, until
+from rig import assert_soft, until
 from setpoint_log import ACCELERATION, STEP, crossing, largest_step, pauses, spread, stretches
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(7200)]
@@ -24,12 +26,9 @@ def tell(name: str, **figures: Any) -> None:
     sys.stdout.flush()
 
 
-def one_kill(rig: Rig, name: str, random: Random) -> dict[str, float]:
+def one_kill(rig: FarRig, name: str, random: Random) -> dict[str, float]:
     """Kill it at a random moment of a drive; how it went on."""
-    if rig.state != "RUN":
-        rig.engage()
-        rig.wait_state("RUN")
-    rig.wait_for(rig.is_moving, "motion")
+    rig.drives_again()
     rig.wait_for(lambda: is_loaded(rig.pid("spare")), "the spare to be loaded")
     # a guard that took over just before does not pass its state on
     time.sleep(random.uniform(1.5, 4.0))
@@ -47,15 +46,16 @@ def one_kill(rig: Rig, name: str, random: Random) -> dict[str, float]:
         rig.wait_for(lambda: is_loaded(rig.pid("spare")), "the next spare to be loaded")
     figure["back_s"] = 1e-9 * (time.monotonic_ns() - began)
     if name != "planner":
+        # a machine that stalls altogether for 0.1 s is a fault of the base to the server
+        rig.drives_again()
         rig.wait_plans(10)
-        rig.wait_state("RUN")
     return figure
 
 
 @pytest.mark.parametrize("name", ["guard", "web", "planner"])
 def test_a_process_is_killed_again_and_again(tmp_path: Path, name: str) -> None:
     random, figures = Random(SEED), []
-    with Rig(tmp_path, web=name == "web") as rig:
+    with FarRig(tmp_path, web=name == "web") as rig:
         rig.drive()
         for number in range(rounds(100)):
             figures.append(one_kill(rig, name, random))
@@ -71,6 +71,7 @@ def test_a_process_is_killed_again_and_again(tmp_path: Path, name: str) -> None:
         told[key] = verdict[key]
     told["step_mm"] = 1e3 * largest_step(log)
     told["pauses"] = spread(pauses(log))
+    told["faults"] = re.findall(r"-> FAULT: (.*)", text)
     told["holds"] = way.count(("RUN", "HOLD"))
     crossings = []
     if name == "guard":
@@ -87,8 +88,8 @@ def test_a_process_is_killed_again_and_again(tmp_path: Path, name: str) -> None:
     if name == "planner":
         assert way.count(("PARKING", "PARKED")) >= len(figures)
     else:
-        # one drive from the first packet to the last: nothing parked in between
-        assert way.count(("READY", "RUN")) == 1
+        # one drive from the first packet to the last: only a fault of the base parts it
+        assert way.count(("PARKED", "RAISING")) == 1 + len(told["faults"])
     if name == "guard":
         assert takeovers == len(figures)
         assert not told["anew"]
@@ -102,7 +103,7 @@ def test_the_supervisor_is_killed_again_and_again(tmp_path: Path) -> None:
     for number in range(rounds(100)):
         folder = tmp_path / str(number)
         folder.mkdir()
-        with Rig(folder, web=number % 2 == 0) as rig:
+        with FarRig(folder, web=number % 2 == 0) as rig:
             rig.run()
             time.sleep(random.uniform(0.0, 3.0))
             began = time.monotonic()

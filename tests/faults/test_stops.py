@@ -10,6 +10,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from far_ends import FarRig
 from process_hands import freeze, is_loaded, rounds
 from rig import Rig, assert_soft, is_alive
 from setpoint_log import ACCELERATION, STEP, crossing, largest_step, spread, stretches
@@ -138,7 +139,7 @@ def test_whoever_stands_still_for_a_moment_moves_nothing(tmp_path: Path) -> None
 @pytest.mark.parametrize("name", list(STOPS))
 def test_a_process_stands_still_again_and_again(tmp_path: Path, name: str) -> None:
     random, figures = Random(1966), []
-    with Rig(tmp_path, web=True) as rig:
+    with FarRig(tmp_path, web=True) as rig:
         rig.run()
         rig.wait_for(lambda: rig.pid("web"), "the page")
         for number in range(rounds(20)):
