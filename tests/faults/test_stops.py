@@ -144,7 +144,7 @@ def test_a_process_stands_still_again_and_again(tmp_path: Path, name: str) -> No
         rig.wait_for(lambda: rig.pid("web"), "the page")
         for number in range(rounds(20)):
             ready(rig, random, (1.2, 2.5))
-            figures.append(one_stop(rig, name, random.uniform(0.1, 5.0)))
+            figures.append(one_stop(rig, name, 0.1 * 50.0 ** random.random()))
             print(number, name, figures[-1], flush=True)
         assert rig.end() == 0
         verdict = rig.verdict()
