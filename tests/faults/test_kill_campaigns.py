@@ -53,7 +53,7 @@ def one_kill(rig: FarRig, name: str, random: Random) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("name", ["guard", "web", "planner"])
-def test_a_process_is_killed_again_and_again(tmp_path: Path, name: str) -> None:
+def test_kills(tmp_path: Path, name: str) -> None:
     random, figures = Random(SEED), []
     with FarRig(tmp_path, web=name == "web") as rig:
         rig.drive()
@@ -98,7 +98,7 @@ def test_a_process_is_killed_again_and_again(tmp_path: Path, name: str) -> None:
         assert all(0.5 < one.periods < 1.5 for one in crossings if not math.isnan(one.periods))
 
 
-def test_the_supervisor_is_killed_again_and_again(tmp_path: Path) -> None:
+def test_supervisor_kills(tmp_path: Path) -> None:
     random, figures = Random(SEED), []
     for number in range(rounds(100)):
         folder = tmp_path / str(number)
