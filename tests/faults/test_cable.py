@@ -18,7 +18,11 @@ from rig import assert_soft
 from setpoint_log import spread
 
 WHY_NOT = why_not()
-pytestmark = pytest.mark.skipif(bool(WHY_NOT), reason=f"no network namespaces: {WHY_NOT}")
+pytestmark = [
+    pytest.mark.campaign,
+    pytest.mark.timeout(3600),
+    pytest.mark.skipif(bool(WHY_NOT), reason=f"no network namespaces: {WHY_NOT}"),
+]
 SPARED, LOST = 0.07, 0.15
 """A base that misses its packets for shorter is no fault, for longer is one [s]; the limit of its
 answers is 0.1 s. A link needs a while to come up: what counts is what the base missed."""
@@ -92,14 +96,12 @@ def pulls(folder: Path, plan: list[tuple[str, float]], seed: int) -> dict[str, A
     return told
 
 
-def test_a_cable_is_pulled_at_each_end_and_put_back(tmp_path: Path) -> None:
+def test_two_pulls(tmp_path: Path) -> None:
     told = pulls(tmp_path, [("simulator", 0.7), ("base", 0.35)], seed=1)
     assert told["outcomes"] == {"simulator": {"HOLD": 1}, "server": {}, "base": {"FAULT": 1}}
 
 
-@pytest.mark.campaign
-@pytest.mark.timeout(3600)
-def test_cables_are_pulled_again_and_again(tmp_path: Path) -> None:
+def test_pulls(tmp_path: Path) -> None:
     random = Random(1890)
     sides = list(SIDES)
     shortest, longest = math.log(0.02), math.log(5.0)

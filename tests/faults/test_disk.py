@@ -19,6 +19,7 @@ from setpoint_log import STEP, largest_step, spread
 
 from motionserver.telemetry.mapped import MappedFile
 
+pytestmark = [pytest.mark.campaign, pytest.mark.timeout(3600)]
 FREE_MB = 6
 """What stays free once a server runs: room for recordings and dumps [MB]."""
 SIZE_MB = 96
@@ -136,7 +137,7 @@ def one_fill(rig: Rig, disk: Disk, number: int, wait: float) -> dict[str, Any]:
     return {"number": number, "full_s": full, "failed": dumped(rig)["failed"]}
 
 
-def test_a_full_disk_costs_words_and_no_motion(tmp_path: Path, disk: Disk) -> None:
+def test_one_fill(tmp_path: Path, disk: Disk) -> None:
     with Rig(on(disk, tmp_path), web=True) as rig:
         rig.run()
         disk.free_again()
@@ -148,9 +149,7 @@ def test_a_full_disk_costs_words_and_no_motion(tmp_path: Path, disk: Disk) -> No
     assert largest_step(tmp_path / "base.log") < STEP
 
 
-@pytest.mark.campaign
-@pytest.mark.timeout(3600)
-def test_the_disk_fills_again_and_again(tmp_path: Path, disk: Disk) -> None:
+def test_fills(tmp_path: Path, disk: Disk) -> None:
     random, figures = Random(451), []
     with FarRig(on(disk, tmp_path), web=True) as rig:
         rig.run()

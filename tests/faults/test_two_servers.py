@@ -45,7 +45,7 @@ def second_servers(rig: Rig) -> None:
 
 def answers(rig: Rig) -> bool:
     url = f"http://127.0.0.1:{rig.page_port}/"
-    with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=2.0) as answer:
+    with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=0.5) as answer:
         return bool(answer.status == 200)
     return False
 
@@ -67,7 +67,7 @@ def starve_page(rig: Rig) -> None:
         rig.wait_for(
             lambda: len(list(Path(f"/proc/{web}/fd").iterdir())) == full, "no descriptor left"
         )
-        rig.wait_plans(60)
+        rig.wait_plans(30)
         assert not answers(rig)
     rig.wait_for(lambda: answers(rig), "the page to recover")
     resource.prlimit(web, resource.RLIMIT_NOFILE, usual)
