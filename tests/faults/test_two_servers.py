@@ -45,7 +45,7 @@ def second_servers(rig: Rig) -> None:
 
 def answers(rig: Rig) -> bool:
     url = f"http://127.0.0.1:{rig.page_port}/"
-    with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=0.5) as answer:
+    with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=10.0) as answer:
         return bool(answer.status == 200)
     return False
 
