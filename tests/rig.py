@@ -168,12 +168,27 @@ class Rig:
         web: bool = False,
         imu: bool = False,
         arguments: tuple[str, ...] = (),
+        base: Any = None,
+        within: tuple[str, ...] = (),
     ) -> None:
+        """Start all.
+
+        Args:
+            folder: Where everything is written.
+            config: Sections that differ from the rig's own.
+            sources: Further sources.
+            web: Whether there is a page.
+            imu: Whether the base sends what its accelerometer reads.
+            arguments: Of the server, behind its configuration.
+            base: Another base than `Base`, with its `start`, `port` and `stop`.
+            within: Command that runs the server's command, such as ``ip netns exec NAME``.
+        """
         self.folder, self.run_dir = folder, folder / "run"
         self.cue_port = free_port()
         self.page_port = free_port(socket.SOCK_STREAM) if web else 0
         imu_port = free_port() if imu else 0
-        self.base = Base(folder / "base.log", ("127.0.0.1", imu_port) if imu else None)
+        force_to = ("127.0.0.1", imu_port) if imu else None
+        self.base = Base(folder / "base.log", force_to) if base is None else base
         self.base.start()
         wanted = [{"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}, *sources]
         if imu:
@@ -193,7 +208,7 @@ class Rig:
         self._drives: list[tuple[threading.Thread, threading.Event]] = []
         with self.log.open("wb") as log:
             self.server = subprocess.Popen(
-                command("run", str(self.config), *arguments),
+                [*within, *command("run", str(self.config), *arguments)],
                 env=environment(),
                 stdout=log,
                 stderr=log,

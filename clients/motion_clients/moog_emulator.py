@@ -203,6 +203,7 @@ def run_emulator(
     *,
     duration: float | None = None,
     reply_port: int | None = None,
+    limits: JudgedLimits | None = None,
     to_base: LinkFlaws | None = None,
     to_host: LinkFlaws | None = None,
     mishaps: Sequence[Mishap] = (),
@@ -221,6 +222,7 @@ def run_emulator(
         config: The machine.
         duration: How long to run [s]; None until a signal.
         reply_port: Port of the host that replies go to; None replies to the sender's.
+        limits: What the judge allows.
         to_base: Flaws of the commands' link.
         to_host: Flaws of the replies' link.
         mishaps: What happens to the base, and when after the start [s].
@@ -248,6 +250,7 @@ def run_emulator(
             config,
             listen=(listen_host, listen_port),
             reply_port=reply_port,
+            limits=limits,
             to_base=to_base,
             to_host=to_host,
             mishaps=mishaps,

@@ -174,11 +174,16 @@ def emulate(
     cut_after: Annotated[
         float | None, typer.Option("--cut-after", help="pull the cable then", metavar="S")
     ] = None,
+    may_lose: Annotated[
+        bool, typer.Option("--may-lose", help="the wire loses packets: judge gaps by their length")
+    ] = False,
 ) -> None:
     """Be a platform: state machine, rate-limited legs, latched faults, and a judge."""
     from motionserver.cli.devices import emulate as emulate_device
 
-    verdict = emulate_device(form, listen, force_to, summary, log, seconds, seed, cut_after)
+    verdict = emulate_device(
+        form, listen, force_to, summary, log, seconds, seed, cut_after, may_lose
+    )
     typer.echo(json.dumps(verdict, indent=2))
 
 

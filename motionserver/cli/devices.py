@@ -9,6 +9,7 @@ from pathlib import Path
 
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_emulator import run_emulator
+from motion_clients.moog_judged import JudgedLimits
 from motion_clients.recording import RecordingError, recording_names, recording_path
 from motion_clients.replay import FORMATS
 from motion_clients.replay import replay as send_recording
@@ -39,6 +40,7 @@ def emulate(
     seconds: float | None,
     seed: int,
     cut_after: float | None,
+    may_lose: bool = False,
 ) -> dict[str, object]:
     """Be a device until a signal, as punctual as permitted; returns the judge's verdict."""
     if form not in EMULATORS:
@@ -57,6 +59,7 @@ def emulate(
             host,
             port,
             duration=seconds,
+            limits=JudgedLimits(may_lose=may_lose),
             log_path=log,
             summary_path=summary,
             force_to=to,

@@ -1,0 +1,89 @@
+"""A second server on a running one's platform refuses to start; a page without descriptors."""
+
+import contextlib
+import json
+import resource
+import socket
+import tomllib
+import urllib.request
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from rig import Rig, assert_soft, cli, free_port
+
+SPARE_DESCRIPTORS = 6
+CROWD = 60
+
+
+def second(rig: Rig, name: str, changes: Mapping[str, Mapping[str, Any]]) -> str:
+    """Start another server with a changed configuration; why it does not."""
+    data = tomllib.loads(rig.config.read_text("utf-8"))
+    for section, values in changes.items():
+        data[section] = values if section == "sources" else {**data[section], **values}
+    path = rig.folder / f"{name}.toml"
+    path.write_text(tomli_w.dumps(data), "utf-8")
+    done = cli("run", str(path), timeout=30.0)
+    assert done.returncode == 2, (done.returncode, done.stderr)
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def second_servers(rig: Rig) -> None:
+    """Whatever it shares with the first one: folder, platform, input."""
+    port = json.loads((rig.run_dir / "config.json").read_text("utf-8"))["sources"][0]["port"]
+    elsewhere = {"server": {"run_dir": str(rig.folder / "other")}, "web": {"enabled": False}}
+    inputs = {"sources": [{"kind": "native", "listen": f"127.0.0.1:{free_port()}"}]}
+    assert "another server runs in" in second(rig, "same", {})
+    told = second(rig, "same_platform", {**elsewhere, **inputs})
+    assert f"127.0.0.1:{rig.base.port}" in told, told
+    platform = {"platform": {"port": free_port()}}
+    told = second(rig, "same_input", {**elsewhere, **platform})
+    assert f"127.0.0.1:{port} cannot be bound" in told, told
+
+
+def answers(rig: Rig) -> bool:
+    url = f"http://127.0.0.1:{rig.page_port}/"
+    with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=10.0) as answer:
+        return bool(answer.status == 200)
+    return False
+
+
+def starve_page(rig: Rig) -> None:
+    """A page that may open hardly anything more is crowded; it recovers, and nothing else knows."""
+    web = rig.pid("web")
+    assert web is not None
+    rig.wait_for(lambda: answers(rig), "the page")
+    usual = resource.prlimit(web, resource.RLIMIT_NOFILE)
+    used = len(list(Path(f"/proc/{web}/fd").iterdir()))
+    resource.prlimit(web, resource.RLIMIT_NOFILE, (used + SPARE_DESCRIPTORS, usual[1]))
+    with contextlib.ExitStack() as crowd:
+        for _ in range(CROWD):
+            link = crowd.enter_context(socket.socket())
+            link.setblocking(False)
+            link.connect_ex(("127.0.0.1", rig.page_port))
+        full = used + SPARE_DESCRIPTORS
+        rig.wait_for(
+            lambda: len(list(Path(f"/proc/{web}/fd").iterdir())) == full, "no descriptor left"
+        )
+        rig.wait_plans(30)
+        assert not answers(rig)
+    rig.wait_for(lambda: answers(rig), "the page to recover")
+    resource.prlimit(web, resource.RLIMIT_NOFILE, usual)
+    assert rig.pid("web") == web
+
+
+def test_second_servers_and_a_starved_page_leave_the_drive_alone(tmp_path: Path) -> None:
+    with Rig(tmp_path, web=True) as rig:
+        rig.run()
+        way = rig.transitions()
+        second_servers(rig)
+        starve_page(rig)
+        rig.wait_plans(20)
+        # a busy machine may hold for a moment
+        assert set(rig.transitions()[len(way) :]) <= {("RUN", "HOLD"), ("HOLD", "RUN")}
+        assert set(rig.shown("service")["restarts"].values()) == {0}
+        assert rig.end() == 0
+        verdict = rig.verdict()
+    assert_soft(verdict)
