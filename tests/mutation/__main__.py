@@ -11,8 +11,6 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-os.environ["OPENBLAS_NUM_THREADS"] = "1"
-
 import pytest
 from mutation import farm
 from mutation.children import each
@@ -96,6 +94,7 @@ def main() -> int:
     commands.choices["run"].add_argument("--killers", action="store_true", help="who killed what")
     given = parser.parse_args()
     os.chdir(ROOT)
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     known, files = named(), files_under(given.files)
     mutants = [m for file in files for m in mutants_of(ROOT, file) if given.match in m.name]
     if given.command == "list":
