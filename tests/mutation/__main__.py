@@ -18,21 +18,26 @@ from mutation.mutants import Mutant, mutants_of, unchanged
 
 ROOT = Path(__file__).parents[2]
 NAMED = Path(__file__).with_name("equivalent.toml")
+_VERDICTS = [f"tests/core/safety/test_{name}.py" for name in ("accept", "verify", "verify_limits")]
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     "motionserver/core/intake": ["tests/intake"],
-    "motionserver/core/plan.py": ["tests/core"],
-    "motionserver/core/motion": ["tests/core"],
-    "motionserver/core/safety": ["tests/core", "tests/house/test_state_diagram.py"],
+    "motionserver/core/plan.py": ["tests/core/test_plan.py"],
+    "motionserver/core/motion": ["tests/core/motion"],
+    "motionserver/core/safety/accept.py": _VERDICTS,
+    "motionserver/core/safety/shape.py": _VERDICTS,
+    "motionserver/core/safety/verdict.py": _VERDICTS,
+    "motionserver/core/safety/verify.py": _VERDICTS,
+    "motionserver/core/safety": ["tests/core/safety", "tests/house/test_state_diagram.py"],
 }
-"""Which tests may kill the mutants of which files."""
+"""Which tests must kill the mutants of which files: those near them; the first that fits counts."""
 
 
 def files_under(names: list[str]) -> list[str]:
     """Source files that are meant, all judged ones if none is named."""
     paths = [ROOT / name for name in names or SUITES]
     found = [file for path in paths for file in (sorted(path.glob("*.py")) or [path])]
-    return [str(file.relative_to(ROOT)) for file in found]
+    return list(dict.fromkeys(str(file.relative_to(ROOT)) for file in found))
 
 
 def suite_of(file: str) -> list[str]:
@@ -89,6 +94,8 @@ def main() -> int:
         command.add_argument(
             "--match", default="", help="only mutants with this text in their name"
         )
+    commands.choices["run"].add_argument("--again", help="only those a saved report shows as open")
+    commands.choices["run"].add_argument("--tests", nargs="+", help="instead of the suite")
     commands.choices["run"].add_argument("--workers", type=int, default=2)
     commands.choices["run"].add_argument("--named", action="store_true", help="named ones as well")
     commands.choices["run"].add_argument("--killers", action="store_true", help="who killed what")
@@ -101,15 +108,19 @@ def main() -> int:
         print(*(f"{m.name}  [line {m.line}]" for m in mutants), sep="\n")
         return 0
     names = {mutant.name for mutant in mutants}
+    if given.again:
+        once = Path(given.again).read_text("utf-8").split("\nopen:\n")[1]
+        mutants = [m for m in mutants if f"  {m.name}  [" in once]
     gone = [name for name in known if name.split(":")[0] in files and name not in names]
     gone = [] if given.match else gone
     farm.preload()
     fates: dict[str, str] = {}
     began = time.monotonic()
-    for tests in {tuple(suite_of(file)): None for file in files}:
-        mine = [m for m in mutants if tuple(suite_of(m.file)) == tests]
+    suites = {m.name: tuple(given.tests or suite_of(m.file)) for m in mutants}
+    for tests in dict.fromkeys(suites.values()):
+        mine = [m for m in mutants if suites[m.name] == tests]
         mine = [m for m in mine if given.named or m.name not in known]
-        fates |= tried(mine, list(tests), given.workers)
+        fates |= tried(mine, list(tests), given.workers) if mine else {}
     alive = {name for name, said in fates.items() if said in ("survived", farm.NEVER)}
     wrong = [name for name in known if name in fates and name not in alive]
     _table(mutants, fates, known, alive)

@@ -62,7 +62,8 @@ def _born(task: Any, work: Callable[[Any], str]) -> tuple[int, int]:
         os.close(write)
         return pid, read
     try:
-        os.setsid()
+        # a group to be ended together; a session of its own would leave what this one is niced to
+        os.setpgid(0, 0)
         os.close(read)
         nothing = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):

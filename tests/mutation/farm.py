@@ -118,9 +118,16 @@ class Collected:
         first, last = mutant.lines
         names = {name for line in range(first, last + 1) for name in passed.get(line, ()) if name}
         kills = self.kills[mutant.function]
-        order = sorted(names, key=lambda name: (-kills[name], self.seconds[name]))
+        order = sorted(
+            names, key=lambda name: (-kills[name], not _is_near(name, mutant), self.seconds[name])
+        )
         _exchange(mutant)
         return self._first_failure(order)
+
+
+def _is_near(name: str, mutant: Mutant) -> bool:
+    """True of the tests that bear the name of the mutated file."""
+    return Path(name.split("::")[0]).name.startswith(f"test_{Path(mutant.file).stem}")
 
 
 def _run(items: list[pytest.Item]) -> str:

@@ -167,7 +167,7 @@ def _changes(node, parent, in_function):
         return
     if isinstance(node, ast.stmt):
         if in_function:
-            yield from _statement(node)
+            yield from _statement(node, parent)
     elif isinstance(node, ast.Constant):
         yield from (ast.Constant(value) for value in _values(node.value))
     elif isinstance(node, ast.Compare):
@@ -207,10 +207,11 @@ def _is_asked(node, parent) -> bool:
     return asks or (isinstance(parent, ast.comprehension) and node in parent.ifs)
 
 
-def _statement(node):
+def _statement(node, parent):
     if isinstance(node, ast.Return):
         if node.value is None or getattr(node.value, "value", 0) is None:
-            yield ast.Pass()
+            if not (isinstance(parent, ast.FunctionDef) and node is parent.body[-1]):
+                yield ast.Pass()
         elif not (isinstance(node.value, ast.Constant) and isinstance(node.value.value, bool)):
             yield ast.Return(ast.Constant(None))
     elif isinstance(
