@@ -18,11 +18,14 @@ from mutation.mutants import Mutant, mutants_of, unchanged
 
 ROOT = Path(__file__).parents[2]
 NAMED = Path(__file__).with_name("equivalent.toml")
-_VERDICTS = [f"tests/core/safety/test_{name}.py" for name in ("accept", "verify", "verify_limits")]
+_VERDICTS = [
+    f"tests/core/safety/test_{name}.py"
+    for name in ("accept", "shape", "verify", "verify_limits", "verdict")
+]
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     "motionserver/core/intake": ["tests/intake"],
-    "motionserver/core/plan.py": ["tests/core/test_plan.py"],
+    "motionserver/core/plan.py": ["tests/core/test_plan.py", "tests/core/safety/test_shape.py"],
     "motionserver/core/motion": ["tests/core/motion"],
     "motionserver/core/safety/accept.py": _VERDICTS,
     "motionserver/core/safety/shape.py": _VERDICTS,
