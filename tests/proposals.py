@@ -1,6 +1,7 @@
 """Plan proposals for the campaign: real smooth plans, and every way of being wrong."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -223,6 +224,7 @@ class Proposer:
         return replace(self._gentle(parent, takeover), takeover=takeover + self.rng.uniform(0.6, 9))
 
 
+@cache
 def goals(machine):
     """Rest poses inside the stroke that only one rule forbids, reached straight from neutral."""
     rng = np.random.default_rng(20)

@@ -34,7 +34,7 @@ class ProtocolError(Exception):
         field: Dotted name of the offending field, where there is one.
     """
 
-    reason: ClassVar[str] = "protocol"
+    reason: ClassVar[str]
 
     def __init__(self, message: str, *, field: str | None = None) -> None:
         super().__init__(message)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Any, Final
 
 from .errors import BlockDuplicateError, BlockLengthError, BlockMissingError, UnknownValueError
 from .framing import block, blocks, close_frame, kind, open_frame
@@ -124,7 +124,7 @@ def decode_status(data: bytes, key: bytes | None = None) -> Status:
         ProtocolError: The packet is refused; the subclass and its `reason` say why.
     """
     frame = open_frame(STATUS_KIND, data, key)
-    values: tuple[int, int, int, int, int, int, int, float, int] | None = None
+    values: tuple[Any, ...] | None = None
     for _, offset, length in blocks(data, frame.end, _KNOWN):
         if values is not None:
             raise BlockDuplicateError(
@@ -136,11 +136,10 @@ def decode_status(data: bytes, key: bytes | None = None) -> Status:
                 f"a changed layout needs a new block type",
                 field="status",
             )
-        *integers, scale, state = BODY.unpack(data, offset)
-        values = (*integers, scale, state)
+        values = BODY.unpack(data, offset)
     if values is None:
         raise BlockMissingError(f"the packet has no status block (type {STATUS})", field="status")
-    state = values[-1]
+    echoed_ns, received_ns, echoed, accepted, lost, reordered, rejected, scale, state = values
     if state >= len(_STATES):
         raise UnknownValueError(
             f"status.state is {state}; known are 0 to {len(_STATES) - 1}; update this client",
@@ -151,7 +150,14 @@ def decode_status(data: bytes, key: bytes | None = None) -> Status:
         frame.sequence,
         frame.sim_time_ns,
         frame.sender_time_ns,
-        *values[:-1],
+        echoed_ns,
+        received_ns,
+        echoed,
+        accepted,
+        lost,
+        reordered,
+        rejected,
+        scale,
         _STATES[state],
     )
 

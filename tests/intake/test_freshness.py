@@ -30,9 +30,11 @@ def test_nothing_has_come() -> None:
     [
         ([], 100, 300),
         ([10], 100, 300),
+        ([10, 10], 10, 50),
         ([10, 10, 10], 10, 50),
         ([1, 1, 1], 5, 50),
         ([20] * 5, 20, 60),
+        ([10, 15, 20, 30, 40], 20, 60),
         ([20, 20, 200, 20, 20], 20, 60),
         ([400, 400, 100], 100, 300),
     ],
@@ -54,6 +56,23 @@ def test_only_the_last_second_counts() -> None:
     fresh.arrived(now + 2 * SECOND_NS)
     assert fresh.interval_ns() == 100 * MS
     assert fresh.rate_hz() == 0.0
+
+
+def test_a_packet_exactly_a_second_old_still_counts() -> None:
+    fresh, now = after(1000.0)
+    assert fresh.rate_hz() == 1.0
+    fresh.arrived(now + 1)
+    assert fresh.rate_hz() == pytest.approx(1e9), "only the last two are left"
+
+
+def test_two_packets_have_a_rate_even_when_two_more_came_together() -> None:
+    assert after(20.0)[0].rate_hz() == pytest.approx(50.0)
+    assert after(0.0, 10.0)[0].rate_hz() == pytest.approx(200.0)
+
+
+def test_of_a_flood_the_newest_1024_packets_are_kept() -> None:
+    assert after(10.0, *[0.0] * 1022)[0].rate_hz() == pytest.approx(102_300.0)
+    assert after(10.0, *[0.0] * 1023)[0].rate_hz() == 0.0
 
 
 def test_bursts_at_one_instant_have_no_rate() -> None:

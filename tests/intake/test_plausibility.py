@@ -52,6 +52,31 @@ def test_what_vehicles_do_is_believed(force, rates) -> None:
     assert believed(gate)
 
 
+@pytest.mark.parametrize(
+    ("force", "rate", "is_told"),
+    [
+        (0.4 * 9.81, 0.0, False),
+        (np.nextafter(0.4 * 9.81, 0.0), 0.0, True),
+        (3.0 * 9.81, 0.0, False),
+        (np.nextafter(3.0 * 9.81, 99.0), 0.0, True),
+        (9.8, 3.0, False),
+        (9.8, np.nextafter(3.0, 4.0), True),
+    ],
+)
+def test_the_edges_themselves_are_what_vehicles_do(force, rate, is_told) -> None:
+    gate = heard(6.0, (0.0, 0.0, force), (rate, 0.0, 0.0))
+    assert bool(gate.plausibility.complaint()) is is_told
+
+
+def test_a_complaint_tells_what_was_found_and_what_is_usual() -> None:
+    assert "is 1.00 m/s2 in the median of 10 s, a vehicle has 4 to 29" in (
+        heard(6.0, (0.0, 0.0, 1.0)).plausibility.complaint()
+    )
+    assert "is 10.0 rad/s in the median of 10 s, a vehicle has less than 3" in (
+        heard(6.0, G, (10.0, 0.0, 0.0)).plausibility.complaint()
+    )
+
+
 def test_nothing_is_said_of_less_than_five_seconds() -> None:
     assert heard(4.9, (0.0, 0.0, 1.0)).plausibility.complaint() == ""
     assert heard(5.0, (0.0, 0.0, 1.0)).plausibility.complaint() != ""

@@ -41,16 +41,10 @@ class Gate:
     """Believe or refuse packets of one input, one owner at a time."""
 
     def __init__(self, may_change_owner: Callable[[], bool] = lambda: True) -> None:
-        self.freshness = Freshness()
-        self.spoilage = Spoilage()
-        self.plausibility = Plausibility()
-        self.owner: Owner | None = None
         self.mode = DriveMode.DRIVE
         self.lost = 0
         self._may_change_owner = may_change_owner
-        self._sequence: int | None = None
-        self._least_offset: float | None = None
-        self._offset_at_ns = 0
+        self._hand_over(None)
 
     def refuse(self, source: str, address: str, motion: VehicleMotion) -> str | None:
         """Judge a packet.
@@ -79,7 +73,7 @@ class Gate:
             self._hand_over(who)
         elif silent:
             # a longer way or a sender's clock that stood still: the delay is learnt anew
-            self._least_offset = None
+            self._quickest = None
         elif self._is_old(motion):
             return "old"
         if motion.sequence is not None and self._sequence is not None:
@@ -133,25 +127,27 @@ class Gate:
             return "replayed"
         return "reordered" if ahead >= 1 << 31 else None
 
-    def _hand_over(self, who: Owner) -> None:
+    def _hand_over(self, who: Owner | None) -> None:
+        """Begin anew: what is known of one owner says nothing of the next."""
         self.owner = who
         self.freshness = Freshness()
         self.spoilage = Spoilage()
         self.plausibility = Plausibility()
-        self._sequence = None
-        self._least_offset = None
+        self._sequence: int | None = None
+        # least delay [ns], let drift since its instant [ns]
+        self._quickest: tuple[float, int] | None = None
 
     def _is_old(self, motion: VehicleMotion) -> bool:
         """Delayed beyond the stale limit against the least delay seen: a burst after a stall."""
         if motion.sender_ns is None:
             return False
         offset = float(motion.arrival_ns - motion.sender_ns)
-        if self._least_offset is None:
-            self._least_offset = offset
-        drift = (motion.arrival_ns - self._offset_at_ns) * _LEAK if self._offset_at_ns else 0.0
-        self._offset_at_ns = motion.arrival_ns
-        self._least_offset = min(self._least_offset + drift, offset)
-        return offset - self._least_offset > self.freshness.stale_after_ns()
+        least = offset
+        if self._quickest is not None:
+            before, at_ns = self._quickest
+            least = min(before + (motion.arrival_ns - at_ns) * _LEAK, offset)
+        self._quickest = (least, motion.arrival_ns)
+        return offset - least > self.freshness.stale_after_ns()
 
 
 def _is_plausible(motion: VehicleMotion) -> bool:

@@ -49,7 +49,7 @@ class Intake:
         self._newest: VehicleMotion | None = None
         self._force = np.zeros(3)
         self._rates = np.zeros(3)
-        self._spin = np.zeros(3)
+        self._spin: Array
         self._used: VehicleMotion | None = None
         self._blanked = False
 
@@ -133,8 +133,10 @@ def _jumped(last: VehicleMotion, now: VehicleMotion) -> bool:
 def _scaled(preview: Preview | None, head: Head, share: float) -> Preview | None:
     if preview is None:
         return None
-    spin = np.gradient(preview.rates, preview.times, axis=0) if len(preview.times) > 1 else 0.0
-    force = transfer(preview.force, preview.rates, spin + np.zeros_like(preview.rates), head.arm)
+    spin = np.zeros_like(preview.rates)
+    if len(preview.times) > 1:
+        spin = np.gradient(preview.rates, preview.times, axis=0)
+    force = transfer(preview.force, preview.rates, spin, head.arm)
     wish = np.clip(force - _UP, -FORCE_MAX, FORCE_MAX)
     rates = np.clip(preview.rates, -RATE_MAX, RATE_MAX)
     return replace(preview, force=frozen(share * wish), rates=frozen(share * rates))

@@ -26,7 +26,6 @@ class Spoilage:
             self._forget()
         self._heard.append((now_ns, is_bad))
         self._bad += is_bad
-        self._forget_before(now_ns - SECOND_NS)
 
     def share(self, now_ns: int) -> float:
         """Share of bad packets in the last second, 0..1; 0 while there are too few to tell."""

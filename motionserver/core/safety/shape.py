@@ -30,8 +30,8 @@ def well_formed(plan: Plan, longest: float) -> Rejection | None:
         np.isfinite(plan.takeover) and all(np.isfinite(t).all() for t in (plan.times, *tables))
     ):
         return Rejection(Reason.NOT_FINITE)
-    if plan.times[0] != 0.0 or np.min(plan.times) < 0.0:
-        return Rejection(Reason.MALFORMED, when=float(np.min(plan.times)))
+    if plan.times[0] != 0.0:
+        return Rejection(Reason.MALFORMED, when=float(plan.times[0]))
     last = float(np.max(plan.times))
     if last > longest:
         return Rejection(Reason.MALFORMED, value=last, allowed=longest)

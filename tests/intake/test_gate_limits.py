@@ -1,0 +1,104 @@
+"""The numbers of the gate, each exactly at its edge, and what a new owner does not inherit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from motions import MS, motion, preview
+
+from motionserver.core.intake.gate import Gate
+from motionserver.core.state import DriveMode
+
+A = ("native", "10.0.0.1:5")
+B = ("native", "10.0.0.2:5")
+TEN_G = 10.0 * 9.81
+FASTEST_TURN = float(np.radians(4000.0))
+
+
+def verdict(packet):
+    return Gate().refuse(*A, packet)
+
+
+@pytest.mark.parametrize(
+    ("most", "told"),
+    [
+        (TEN_G, lambda v: motion(force=(0.0, -v, 0.0))),
+        (TEN_G, lambda v: motion(preview=preview([0.1], x=v))),
+        (FASTEST_TURN, lambda v: motion(rates=(0.0, 0.0, -v))),
+        (FASTEST_TURN, lambda v: motion(preview=preview([0.1], rate=v))),
+        (1000.0, lambda v: motion(speed=-v)),
+        (60.0, lambda v: motion(preview=preview([0.1, v]))),
+    ],
+    ids=["force", "force ahead", "rates", "rates ahead", "speed", "farthest"],
+)
+def test_the_edge_itself_is_believed_and_what_lies_beyond_is_not(most, told):
+    assert verdict(told(most)) is None
+    assert verdict(told(np.nextafter(most, np.inf))) == "out-of-range"
+
+
+def test_before_the_first_packet_nothing_is_fresh_and_nothing_believed():
+    gate = Gate()
+    assert gate.mode is DriveMode.DRIVE
+    assert not gate.is_fresh(0)
+    assert gate.believed_ns(0, is_cued=True) == 0
+    assert gate.believed_ns(0, is_cued=False) == 0
+
+
+def test_an_owner_that_falls_silent_is_not_fresh_for_longer_than_its_patience():
+    gate = Gate()
+    gate.refuse(*A, motion(0.0, 1))
+    assert gate.is_fresh(300 * MS)
+    assert not gate.is_fresh(300 * MS + 1)
+
+
+def test_good_packets_outweigh_a_few_bad_ones():
+    gate = Gate()
+    for k in range(200):
+        gate.refuse(*A, motion(4.0 * k, k))
+        if k % 16 == 0:
+            gate.spoilt(*A, 4 * MS * k)
+    assert gate.is_fresh(796 * MS)
+    assert gate.spoilage.share(796 * MS) == pytest.approx(13 / 213)
+
+
+def test_an_owner_that_took_leave_leaves_nothing_to_the_next():
+    gate = Gate()
+    for k in range(20):
+        gate.refuse(*A, motion(10.0 * k, k))
+        gate.spoilt(*A, 10 * MS * k)
+    gate.refuse(*A, motion(200.0, 20, mode=DriveMode.BYE))
+    assert gate.refuse(*B, motion(210.0, 500)) is None
+    assert gate.freshness.rate_hz() == 0.0, "its own packets only"
+    assert gate.lost == 0, "its own sequence"
+    assert gate.is_fresh(210 * MS), "its own nonsense"
+
+
+def aged(slower_ppm, seconds):
+    """Verdicts on a sender that speaks every 1.9 s, whose clock runs slower than ours."""
+    gate, found = Gate(), set()
+    for k in range(int(seconds / 1.9)):
+        sent = 1900.0 * k * (1.0 - slower_ppm * 1e-6)
+        found.add(gate.refuse(*A, motion(1900.0 * k, k, sent_ms=sent)))
+    return found
+
+
+def test_a_clock_that_runs_90_ppm_slow_is_followed_for_hours():
+    # unfollowed it would seem to lag by 300 ms after 55 minutes
+    assert aged(90.0, 7200.0) == {None}
+
+
+def test_a_clock_that_runs_200_ppm_slow_is_not_told_from_a_growing_delay():
+    assert aged(200.0, 2900.0) == {None}
+    assert aged(200.0, 3100.0) == {None, "old"}
+
+
+def test_a_delay_exactly_at_the_patience_is_borne():
+    def later(by_ns):
+        gate = Gate()
+        for sequence in (1, 2):
+            assert gate.refuse(*A, motion(1000.0, sequence, sent_ms=1000.0)) is None
+        sent = 1000 * MS - by_ns
+        return gate.refuse(*A, replace(motion(1000.0, 3), sender_ns=sent))
+
+    assert later(300 * MS) is None
+    assert later(300 * MS + 1) == "old"
