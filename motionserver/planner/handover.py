@@ -14,7 +14,7 @@ from motionserver.telemetry.link import STATES, GuardClock, Maps
 SECOND: Final = 1_000_000_000
 ALIVE_NS: Final = 200_000_000
 STANDS_NS: Final = 20_000_000
-"""So late behind its own slot, and a slot later, a guard stands still, and its plan with it [ns]."""
+"""A guard so far behind its own slot, and a slot more, stands still, and its plan with it [ns]."""
 KEPT: Final = 16
 PATIENCE: Final = 1
 CONFIDENCE: Final = 300

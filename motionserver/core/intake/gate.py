@@ -46,6 +46,16 @@ class Gate:
         self._may_change_owner = may_change_owner
         self._hand_over(None)
 
+    def _hand_over(self, who: Owner | None) -> None:
+        """Begin anew: what is known of one owner says nothing of the next."""
+        self.owner = who
+        self.freshness = Freshness()
+        self.spoilage = Spoilage()
+        self.plausibility = Plausibility()
+        self._sequence: int | None = None
+        # least delay [ns], let drift since its instant [ns]
+        self._quickest: tuple[float, int] | None = None
+
     def refuse(self, source: str, address: str, motion: VehicleMotion) -> str | None:
         """Judge a packet.
 
@@ -126,16 +136,6 @@ class Gate:
         if ahead == 0:
             return "replayed"
         return "reordered" if ahead >= 1 << 31 else None
-
-    def _hand_over(self, who: Owner | None) -> None:
-        """Begin anew: what is known of one owner says nothing of the next."""
-        self.owner = who
-        self.freshness = Freshness()
-        self.spoilage = Spoilage()
-        self.plausibility = Plausibility()
-        self._sequence: int | None = None
-        # least delay [ns], let drift since its instant [ns]
-        self._quickest: tuple[float, int] | None = None
 
     def _is_old(self, motion: VehicleMotion) -> bool:
         """Delayed beyond the stale limit against the least delay seen: a burst after a stall."""
