@@ -36,7 +36,7 @@ if "motionserver.guard" in sys.orig_argv:
 '''
 
 
-@pytest.mark.parametrize("where", ["before", "after"])
+@pytest.mark.parametrize("where", [pytest.param("before", marks=pytest.mark.campaign), "after"])
 def test_a_guard_that_dies_about_a_packet_leaves_no_sample_out_and_sends_none_twice(
     tmp_path: Path, where: str
 ) -> None:
