@@ -4,8 +4,9 @@ import os
 from pathlib import Path
 
 import pytest
+from far_ends import FarRig
 from process_hands import is_loaded
-from rig import ROOT, Rig, assert_soft
+from rig import ROOT, assert_soft
 from setpoint_log import periods_of_motion
 
 FAST = 0.1
@@ -43,7 +44,7 @@ def test_a_guard_that_dies_about_a_packet_leaves_no_sample_out_and_sends_none_tw
     (tmp_path / "sitecustomize.py").write_text(DEATH, "utf-8")
     folders = [str(tmp_path), *(str(ROOT / name) for name in ("", "protocol", "clients"))]
     path = f"PYTHONPATH={os.pathsep.join(folders)}"
-    with Rig(tmp_path, within=("env", path, f"DEATHS={tmp_path}")) as rig:
+    with FarRig(tmp_path, within=("env", path, f"DEATHS={tmp_path}")) as rig:
         rig.run()
         rig.wait_for(lambda: is_loaded(rig.pid("spare")), "the spare to be loaded")
         old = rig.pid("guard")
