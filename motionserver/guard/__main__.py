@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import fcntl
 import gc
 import logging
+import os
 import signal
 import sys
 from pathlib import Path
@@ -36,21 +38,29 @@ def main() -> int:
     gc.collect()
     gc.freeze()
     memory = lock_memory(options.realtime)
-    with (run_dir / "guard.lock").open("a+") as lock:
+    lock = os.open(run_dir / "guard.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        lock.seek(0)
-        ended = lock.read()
+        ended = os.pread(lock, 8, 0).strip()
         if told and ended:
             # the guard before it parked and left in order: nothing remains to be done
             return int(ended)
-        lock.truncate(0)
+        _note(lock, b" ")
         loop = GuardLoop(options, run_dir, link, f"{scheduling}, {memory}")
         signal.signal(signal.SIGTERM, lambda *_: loop.ask_to_leave("terminated"))
         if told or sys.argv[3:] == ["leave"]:
             loop.ask_to_leave("told before its turn came")
         status = asyncio.run(loop.run())
-        lock.write(str(status))
+        _note(lock, str(status).encode())
         return status
+    finally:
+        os.close(lock)
+
+
+def _note(lock: int, text: bytes) -> None:
+    """Write over the one byte of the lock's file; a disk that is full keeps nobody from ending."""
+    with contextlib.suppress(OSError):
+        os.pwrite(lock, text, 0)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from motionserver.core.device import Feedback
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
 from motionserver.core.safety.inherit import inherit
@@ -63,6 +64,7 @@ class GuardLoop:
         self._taken_ns = 0
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
+        self._early: tuple[Feedback, ...] = ()
         self._start_ns = now_ns()
         self.scheduling = scheduling
         self._seldom = Seldom(log)
@@ -93,10 +95,15 @@ class GuardLoop:
     def _begin(self, now: int) -> None:
         """Start the clock; after another guard in its rhythm, so that no packet comes too soon."""
         self._start_ns = self._last_ns = now
-        will = self._ports.left()
-        if will is None:
+        left = self._ports.left()
+        if left is None:
             return
-        if inherit(self.guard, will, now):
+        will, is_sent = left
+        if not is_sent:
+            # it died about its packet; a base that answers it has got it
+            self._early = self._ports.feedback()
+            is_sent = bool(self._early)
+        if inherit(self.guard, will, now, is_sent):
             self._taken_ns = now
         send_ns = self._ticks_per_send * self._tick_ns
         slots = (now - will.due_ns) // send_ns + 1
@@ -136,7 +143,7 @@ class GuardLoop:
             now_ns=now,
             gap=(now - self._last_ns) / SECOND,
             is_due=is_due,
-            feedback=self._ports.feedback(),
+            feedback=self._early + self._ports.feedback(),
             cue=self._ports.cue(),
             proposal=self._ports.proposal(),
             requests=tuple(
@@ -146,7 +153,7 @@ class GuardLoop:
         )
         if given.gap > 1.5e-9 * self._tick_ns:
             counters["late_ticks"] += 1
-        self._last_ns = now
+        self._last_ns, self._early = now, ()
         setpoint, answers = self.guard.tick(given)
         if setpoint is not None:
             if self._sent_slot >= 0:
@@ -158,12 +165,7 @@ class GuardLoop:
         if setpoint is not None or self._ports.has_news(self.guard.record):
             sent = self._sends[-1] if self._sends else now
             self._ports.publish(sent, now, due, self.guard.record)
-        is_sent = setpoint is not None and self._ports.send(setpoint)
-        if setpoint is not None:
-            self.guard.told(now, is_sent)
-            self._setpoint = setpoint
-            newest = self.guard.supervisor.device.newest
-            self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))
+        is_sent = setpoint is not None and self._send(setpoint, now, due)
         if given.proposal is not self.guard.judged:
             # the black box writes a verdict into the tick it was given in
             given = replace(given, proposal=self.guard.judged)
@@ -181,6 +183,25 @@ class GuardLoop:
         if is_last or (now - self._snapshot_ns > SNAPSHOT_NS and not self.guard.is_checking):
             self._snapshot_ns = now
             self._show(now)
+
+    def _send(self, setpoint: Setpoint, now: int, due: int) -> bool:
+        """Write the will, send, tell that it was sent.
+
+        Whenever we die, no sample is sent twice and none is left out.
+        """
+        self._setpoint = setpoint
+        self._leave_will(due)
+        is_sent = self._ports.send(setpoint)
+        self.guard.told(now, is_sent)
+        if not is_sent:
+            # the plan's clock stood still: what is left is the state behind the packet before
+            self._leave_will(due)
+            self._ports.settle()
+        return is_sent
+
+    def _leave_will(self, due: int) -> None:
+        newest = self.guard.supervisor.device.newest
+        self._ports.leave(will_of(self.guard.record, newest, self._taken_ns, due))
 
     def _show(self, now: int) -> None:
         if self._setpoint is not None:

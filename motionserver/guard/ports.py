@@ -20,7 +20,7 @@ from motionserver.core.safety.will import Will, WillWriter, unpack_will
 from motionserver.guard.options import GuardOptions
 from motionserver.platforms.base import PlatformPacketError
 from motionserver.platforms.registry import make_platform
-from motionserver.telemetry.link import STATES, GuardClock, Maps, unpack_cue
+from motionserver.telemetry.link import SEQUENCE, STATES, GuardClock, Maps, unpack_cue
 from motionserver.telemetry.sieve import dropped, sieve
 from motionserver.telemetry.ticker import now_ns
 
@@ -137,26 +137,38 @@ class Ports:
         except OSError:
             self._counters["send_errors"] += 1
             return False
+        self.settle()
         self._counters["packets_sent"] += 1
         return True
 
+    def settle(self) -> None:
+        """Tell a successor that the packet of the newest will has gone out."""
+        self._maps.sent.write(SEQUENCE.pack(self._maps.will.newest_sequence()))
+
     def leave(self, will: Will) -> None:
-        """Write down what a successor needs; what is too long for its file is counted."""
+        """Write down what a successor needs, before the packet it tells of goes out.
+
+        What is too long for its file is counted.
+        """
         try:
             self._maps.will.write(self._writer.pack(will))
         except ValueError:
             self._counters["wills_too_long"] += 1
 
-    def left(self) -> Will | None:
-        """What the guard before left; None if there was none, or it cannot be read."""
-        message = self._maps.will.read()
+    def left(self) -> tuple[Will, bool] | None:
+        """What the guard before left, and whether it said that the packet of it went out.
+
+        None if there was none, or it cannot be read.
+        """
+        message, sent = self._maps.will.read(), self._maps.sent.read()
         if message is None:
             return None
         try:
-            return unpack_will(message[1])
+            will = unpack_will(message[1])
         except ValueError:
             self._counters["wills_malformed"] += 1
             return None
+        return will, sent is not None and SEQUENCE.unpack(sent[1])[0] == message[0]
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

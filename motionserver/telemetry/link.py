@@ -18,6 +18,7 @@ from motionserver.telemetry.trace import TRACE_BYTES
 STATES: Final = tuple(State)
 _CLOCK: Final = struct.Struct("<BQdQQQ")
 _CUE: Final = struct.Struct("<QQBQ")
+SEQUENCE: Final = struct.Struct("<Q")
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 _WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
@@ -76,7 +77,8 @@ class Maps:
         accepted: Guard to planner: the newest accepted plan.
         clock: Guard to planner: `GuardClock`.
         cue: Planner to guard: the source's status.
-        will: Guard to its successor: `core.safety.will.Will`, with every packet.
+        will: Guard to its successor: `core.safety.will.Will`, before every packet.
+        sent: Guard to its successor: sequence of the will whose packet went out, right after it.
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
@@ -92,6 +94,7 @@ class Maps:
         self.clock = opened("clock", _CLOCK.size)
         self.cue = opened("cue", _CUE.size)
         self.will = opened("will", _WILL_BYTES)
+        self.sent = opened("sent", SEQUENCE.size)
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)

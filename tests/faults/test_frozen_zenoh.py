@@ -8,7 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-from rig import PATIENCE, Rig, assert_soft, environment, free_port, prompt
+from far_ends import FarRig
+from rig import PATIENCE, assert_soft, environment, free_port, prompt
 
 PUBLISHER = """
 import json, math, sys, time
@@ -40,7 +41,7 @@ def test_a_frozen_publisher_is_held_at_once_and_drives_again(tmp_path: Path) -> 
     script = tmp_path / "publisher.py"
     script.write_text(PUBLISHER, "utf-8")
     sources = ({"kind": "zenoh", "listen": f"127.0.0.1:{broker}"},)
-    with Rig(tmp_path, {"cueing": {"algorithm": "classical"}}, sources=sources) as rig:
+    with FarRig(tmp_path, {"cueing": {"algorithm": "classical"}}, sources=sources) as rig:
         rig.wait_for(lambda: rig.shown("planner"), "the planner")
         publisher = subprocess.Popen(
             [sys.executable, str(script), f"tcp/127.0.0.1:{broker}"],

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from far_ends import FarRig
 from process_hands import freeze, is_loaded, rounds
-from rig import Rig, assert_soft, is_alive
+from rig import assert_soft, is_alive
 from setpoint_log import ACCELERATION, STEP, crossing, largest_step, spread, stretches
 
 KILL = "stands still; killed"
@@ -27,13 +27,13 @@ KILLED = 1.0
 """A guard that stands for so long is killed [s], even by a supervisor that is looked at askance."""
 
 
-def serve(rig: Rig) -> int:
+def serve(rig: FarRig) -> int:
     """Status of the page's answer."""
     with urllib.request.urlopen(f"http://127.0.0.1:{rig.page_port}/", timeout=30.0) as answer:
         return int(answer.status)
 
 
-def ready(rig: Rig, random: Random, wait: tuple[float, float]) -> None:
+def ready(rig: FarRig, random: Random, wait: tuple[float, float]) -> None:
     """In motion, at a random moment."""
     if rig.state != "RUN":
         rig.engage()
@@ -44,7 +44,7 @@ def ready(rig: Rig, random: Random, wait: tuple[float, float]) -> None:
     time.sleep(random.uniform(*wait))
 
 
-def stop_guard(rig: Rig, seconds: float) -> str:
+def stop_guard(rig: FarRig, seconds: float) -> str:
     """The supervisor kills it, and the spare goes on with the same drive."""
     old, spare = rig.pid("guard"), rig.pid("spare")
     before, told = rig.counter("takeovers", "guard"), rig.text().count(KILL)
@@ -60,7 +60,7 @@ def stop_guard(rig: Rig, seconds: float) -> str:
     return "killed"
 
 
-def stop_planner(rig: Rig, seconds: float) -> str:
+def stop_planner(rig: FarRig, seconds: float) -> str:
     """Its plan plays to rest; nobody replaces it, and it drives again."""
     old = rig.pid("planner")
     assert old is not None
@@ -70,7 +70,7 @@ def stop_planner(rig: Rig, seconds: float) -> str:
     return "woke"
 
 
-def stop_web(rig: Rig, seconds: float) -> str:
+def stop_web(rig: FarRig, seconds: float) -> str:
     old = rig.pid("web")
     assert old is not None
     freeze(old, seconds)
@@ -80,7 +80,7 @@ def stop_web(rig: Rig, seconds: float) -> str:
     return "woke"
 
 
-def stop_supervisor(rig: Rig, seconds: float) -> str:
+def stop_supervisor(rig: FarRig, seconds: float) -> str:
     """Nobody is killed by a supervisor that wakes up: it stood itself."""
     pids, told = [rig.pid(name) for name in CHILDREN], rig.text().count(KILL)
     freeze(rig.server.pid, seconds)
@@ -99,7 +99,7 @@ STOPS = {
 }
 
 
-def one_stop(rig: Rig, name: str, seconds: float) -> dict[str, Any]:
+def one_stop(rig: FarRig, name: str, seconds: float) -> dict[str, Any]:
     """Stop a process for so long; how it went on."""
     before = len(rig.transitions())
     began = time.monotonic_ns()
@@ -120,7 +120,7 @@ def one_stop(rig: Rig, name: str, seconds: float) -> dict[str, Any]:
 
 def test_whoever_stands_still_for_a_moment_moves_nothing(tmp_path: Path) -> None:
     random = Random(7)
-    with Rig(tmp_path, web=True) as rig:
+    with FarRig(tmp_path, web=True) as rig:
         rig.run()
         rig.wait_for(lambda: rig.pid("web"), "the page")
         for name, seconds in (("web", 0.6), ("supervisor", 0.6), ("planner", 0.4)):

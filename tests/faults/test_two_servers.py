@@ -6,18 +6,20 @@ import resource
 import socket
 import tomllib
 import urllib.request
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import pytest
 import tomli_w
-from rig import Rig, assert_soft, cli, free_port
+from far_ends import FarRig
+from rig import assert_soft, cli, free_port
 
 SPARE_DESCRIPTORS = 6
 CROWD = 60
 
 
-def second(rig: Rig, name: str, changes: Mapping[str, Mapping[str, Any]]) -> str:
+def second(rig: FarRig, name: str, changes: Mapping[str, Mapping[str, Any]]) -> str:
     """Start another server with a changed configuration; why it does not."""
     data = tomllib.loads(rig.config.read_text("utf-8"))
     for section, values in changes.items():
@@ -30,7 +32,7 @@ def second(rig: Rig, name: str, changes: Mapping[str, Mapping[str, Any]]) -> str
     return done.stderr
 
 
-def second_servers(rig: Rig) -> None:
+def second_servers(rig: FarRig) -> None:
     """Whatever it shares with the first one: folder, platform, input."""
     port = json.loads((rig.run_dir / "config.json").read_text("utf-8"))["sources"][0]["port"]
     elsewhere = {"server": {"run_dir": str(rig.folder / "other")}, "web": {"enabled": False}}
@@ -43,14 +45,14 @@ def second_servers(rig: Rig) -> None:
     assert f"127.0.0.1:{port} cannot be bound" in told, told
 
 
-def answers(rig: Rig) -> bool:
+def answers(rig: FarRig) -> bool:
     url = f"http://127.0.0.1:{rig.page_port}/"
     with contextlib.suppress(OSError), urllib.request.urlopen(url, timeout=10.0) as answer:
         return bool(answer.status == 200)
     return False
 
 
-def starve_page(rig: Rig) -> None:
+def starve_page(rig: FarRig) -> None:
     """A page that may open hardly anything more is crowded; it recovers, and nothing else knows."""
     web = rig.pid("web")
     assert web is not None
@@ -74,12 +76,11 @@ def starve_page(rig: Rig) -> None:
     assert rig.pid("web") == web
 
 
-def test_second_servers_and_a_starved_page_leave_the_drive_alone(tmp_path: Path) -> None:
-    with Rig(tmp_path, web=True) as rig:
+def drive(folder: Path, harm: Callable[[FarRig], None]) -> None:
+    with FarRig(folder, web=True) as rig:
         rig.run()
         way = rig.transitions()
-        second_servers(rig)
-        starve_page(rig)
+        harm(rig)
         rig.wait_plans(20)
         # a busy machine may hold for a moment
         assert set(rig.transitions()[len(way) :]) <= {("RUN", "HOLD"), ("HOLD", "RUN")}
@@ -87,3 +88,13 @@ def test_second_servers_and_a_starved_page_leave_the_drive_alone(tmp_path: Path)
         assert rig.end() == 0
         verdict = rig.verdict()
     assert_soft(verdict)
+
+
+def test_second_servers_leave_the_first_alone(tmp_path: Path) -> None:
+    drive(tmp_path, second_servers)
+
+
+@pytest.mark.campaign
+def test_a_page_without_descriptors_recovers(tmp_path: Path) -> None:
+    drive(tmp_path, starve_page)
+    print(f"log: {(tmp_path / 'server.log').stat().st_size} bytes")

@@ -50,6 +50,8 @@ class Guard:
             PatientCheck(config.machine, self.homes, config.slices) if config.slices else None
         )
         self._before: Playback | None = None
+        # the sample at the plan's clock has not been sent yet
+        self.owes_sample = self._owed = False
         self._unsent_ns = 0
         self._last = Setpoint(
             Order.WAIT, PlatformState.at_rest(NEUTRAL), leg_lengths(self.machine, NEUTRAL)
@@ -97,7 +99,7 @@ class Guard:
         if is_sent:
             self._unsent_ns = 0
             return
-        record.playback = self._before
+        record.playback, self.owes_sample = self._before, self._owed
         self._unsent_ns = self._unsent_ns or now_ns
         unheard = (now_ns - self._unsent_ns) / SECOND
         if record.state in RAISED and unheard > self.config.patience.feedback:
@@ -186,7 +188,8 @@ class Guard:
         record = self.record
         order = self._order(now_ns)
         self._before = record.playback
-        if record.playback is not None and order is Order.FOLLOW:
+        self._owed, self.owes_sample = self.owes_sample, False
+        if record.playback is not None and order is Order.FOLLOW and not self._owed:
             record.playback = advance(record.playback, self.config.send_period)
             self._go_home(now_ns)
         if record.playback is None:

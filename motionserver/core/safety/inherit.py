@@ -24,7 +24,7 @@ QUIET: Final = 1.0
 what it was left may be what killed it."""
 
 
-def inherit(guard: Guard, will: Will, now_ns: int) -> bool:
+def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool:
     """Let a fresh guard take the place of the one that left ``will``.
 
     Latched states stay latched however old the will is, and an edge that was used stays used. The
@@ -34,6 +34,7 @@ def inherit(guard: Guard, will: Will, now_ns: int) -> bool:
         guard: A guard that has not ticked yet.
         will: What the one before left.
         now_ns: Now [ns].
+        is_sent: Whether the packet that the will tells of went out; else it is the next one.
 
     Returns:
         True if the same plan goes on; False if it must begin from where the platform is measured.
@@ -60,6 +61,7 @@ def inherit(guard: Guard, will: Will, now_ns: int) -> bool:
         return False
     record.state, record.reason, record.since_ns = will.state, will.reason, will.since_ns
     record.deadline_ns, record.playback = will.deadline_ns, playback
+    guard.owes_sample = not is_sent
     guard.supervisor.resume(will.feedback, record.accepted_ns, now_ns)
     how = "stays" if why else "goes on"
     record.note(now_ns, f"the guard before ended in {will.state}; {how} in it")

@@ -59,6 +59,24 @@ def test_the_next_packets_are_those_of_the_guard_that_ended(state, later):
     legal(b)
 
 
+def test_a_sample_that_never_went_out_is_the_next_one_even_if_the_network_refuses_it_first():
+    b = bench()
+    b.engaged()
+    away(b)
+    b.tick("park")
+    follows(b, 30)
+    will = written(b)
+    unsent = b.sent[-1].state.pose
+    b.guard = Guard(b.config)
+    assert inherit(b.guard, will, b.now, is_sent=False)
+    refused = follows(b, 1)[0]
+    b.guard.told(b.now, False)
+    again, after = follows(b, 2)
+    assert np.array_equal(refused, unsent)
+    assert np.array_equal(again, unsent)
+    assert not np.array_equal(after, unsent)
+
+
 @given(st.integers(0, 200))
 @settings(max_examples=25, deadline=None)
 def test_in_the_middle_of_a_motion_at_any_packet(packets):
