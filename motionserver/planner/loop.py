@@ -63,7 +63,7 @@ class PlannerLoop:
         self._state: State | None = None
         self._inputs = Inputs(
             [open_input(one) for one in options.inputs],
-            lambda: self._state is not State.RUN,
+            lambda: self._state not in (State.RUN, State.HOLD),
             keeper_of(options, run_dir),
         )
         self._intake = Intake()

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from motionserver.planner.sessions import Sessions
 from motionserver.platforms.moog import Moog6Dof2000E
 from motionserver.sources.udp import BUFFER, DRAIN
 from motionserver.sources.zenoh_input import DEPTH
@@ -54,6 +55,7 @@ class Files:
     def __init__(self, when_thought):
         self.proposal = Slot(PLAN_BYTES, when_thought)
         self.accepted, self.clock, self.cue, self.will = Slot(PLAN_BYTES), Slot(), Slot(), Slot()
+        self.sent = Slot()
         self.guard, self.planner, self.service = Slot(32768), Slot(32768), Slot(8192)
         self.trace = Slot()
 
@@ -158,6 +160,20 @@ class Box:
         return lambda *_: None
 
 
+class Remembered:
+    """Signed sessions, kept over the death of a planner as the run directory keeps them."""
+
+    def __init__(self):
+        self.counters = Counter()
+        self.hear = Sessions().hear
+
+    def keep(self):
+        pass
+
+    def close(self):
+        pass
+
+
 class Done:
     """The guard's future: its exit status once it has ended."""
 
@@ -229,6 +245,7 @@ def fitted(world):
             "planner.loop.RequestServer": requests,
             "planner.loop.PlannerBox": Box,
             "planner.loop.open_input": opened,
+            "planner.loop.keeper_of": lambda *_: world.sessions,
             "planner.loop.now_ns": world.planner_clock,
             "planner.loop.SNAPSHOT_NS": SECOND,
             "planner.loop.gc": quiet,

@@ -172,9 +172,10 @@ class F3(ClientFault):
         motion = cue.motion
         if self.kind == "teleport":
             return replace(cue, motion=replace(motion, speed=motion.speed + self.size))
-        # only the newest packet of a period is felt: a spike lasts a few
+        # only the newest packet of a period is felt: a spike lasts a few; what is dropped for as
+        # long would be silence
         if self.is_wrong(0.0 if self.kind == "beyond" else 0.01):
-            self._until_ns = self.world.now + 40_000_000
+            self._until_ns = self.world.now + (20_000_000 if self.kind == "beyond" else 40_000_000)
         if self.world.now > self._until_ns:
             return cue
         size = self.size * (4.0 if self.kind == "beyond" else 1.0)

@@ -21,6 +21,7 @@ from fittings import (
     Collector,
     Done,
     Files,
+    Remembered,
     Requests,
     UdpWay,
     ZenohWay,
@@ -116,8 +117,10 @@ class World:
             (InputOptions(kind, "192.0.2.1", PORT, key, "motion/0/in/cue", ()),),
             {"algorithm": algorithm, "scale": 0.6},
             NOWHERE / "tuning.json",
+            NOWHERE / "sessions.bin",
             False,
         )
+        self.sessions = Remembered() if key else None
         self.base.advance(self.seconds)
         self._watch_base()
 
