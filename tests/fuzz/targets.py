@@ -12,6 +12,7 @@ import targets_devices
 import targets_encode
 import targets_files
 import targets_maps
+import targets_will
 from demand import KEY
 from mutate import Shape
 
@@ -133,6 +134,14 @@ def _mend_mapped(data, rng):
     return data
 
 
+def _mend_will(data, rng):
+    """The length in front of the head as it must be, plans kept."""
+    start, end = data.find(b"{"), data.rfind(b"}") + 1
+    if start < 0 or end <= start:
+        return data
+    return bytearray((end - start).to_bytes(4, "little")) + data[start:end] + data[end:]
+
+
 VALUES = (
     b"nan", b"inf", b"-inf", b"0", b"-0.0", b"1", b"-1", b"1e308", b"5e-324", b"true", b'"x"',
     b"[]", b"{}", b"[1, 2]", b'""', b'"\\u0000"', b'"~nobody-here/x"', b"9" * 25, b"9" * 4400,
@@ -162,6 +171,8 @@ _MACHINE = _told(
 _PRESET = _told("about values [values] algorithm scale legs box_surge_m horizon_s backend osqp")
 _REQUEST = _told('"op" "engage" "park" "reset" "tune" "undo" "tuning" "by" "if_version" "changes" '
                  '"scale" "legs" "algorithm" "http" { } : ,')  # fmt: skip
+_WILL = _told('"has_before" "feedback" "state" "clock" "counters" "plans" "legs" "pose" "phase" '
+              '"faults" "RUN" "FAULT" "up" "estop" false { } : , "x":')  # fmt: skip
 _PRESETS = ROOT / "motionserver" / "presets"
 
 TARGETS = {
@@ -184,6 +195,7 @@ TARGETS = {
         Target("command", targets_devices.command, Shape(_fields(">IffffffBBBB")), 0.04),
         Target("plan", targets_maps.plan,
                Shape(_fields("<QQdII"), _mend_plan, repeat=(32, 8, "<d")), 0.06),
+        Target("will", targets_will.will, Shape([], _mend_will, _WILL), 0.01),
         Target("link", targets_maps.link, Shape(_fields("<QQBQ") + _fields("<BQdQQQ")), 0.04),
         Target("request", targets_maps.request, Shape(tokens=_REQUEST), 0.01),
         Target("mapped", targets_maps.mapped,

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import struct
 from dataclasses import asdict, dataclass, fields
+from math import isfinite
 from typing import Any, Final
+
+import numpy as np
 
 from motionserver.core.axes import frozen
 from motionserver.core.device import Feedback, Phase
@@ -56,6 +59,15 @@ class Will:
 
 
 _PLAIN: Final = tuple(f.name for f in fields(Will) if f.name not in ("feedback", "before", "plans"))
+_KINDS: Final = {
+    "state": str,
+    "reason": str,
+    "leaving": bool,
+    "engaged_once": bool,
+    "clock": float,
+    "counters": dict,
+}
+"""What the head holds that is no instant or number, as JSON has it."""
 
 
 def will_of(record: GuardRecord, feedback: Feedback | None, taken_ns: int, due_ns: int) -> Will:
@@ -119,7 +131,7 @@ def unpack_will(data: bytes) -> Will:
             (length,) = _LENGTH.unpack_from(data, at)
             parts.append(data[at + 4 : at + 4 + length])
             at += 4 + length
-        head = json.loads(parts[0])
+        head = _checked(json.loads(parts[0]))
         plans = [unpack(part) for part in parts[1:]]
         before = plans.pop(0) if head.pop("has_before") else None
         feedback = head.pop("feedback")
@@ -129,8 +141,28 @@ def unpack_will(data: bytes) -> Will:
             before=before,
             plans=tuple(plans),
         )
-    except (ValueError, KeyError, IndexError, TypeError, struct.error) as error:
+    except (LookupError, TypeError, ArithmeticError, RecursionError, struct.error) as error:
+        raise ValueError(f"will of a guard: {type(error).__name__}: {error}") from error
+    except ValueError as error:
         raise ValueError(f"will of a guard: {error}") from error
+
+
+def _checked(head: Any) -> dict[str, Any]:  # noqa: ANN401  (whatever JSON holds)
+    """The head, if a guard can be told what is in it."""
+    if not isinstance(head, dict):
+        raise TypeError(f"its head is {head!r}"[:80])
+    for name in _PLAIN:
+        value = head[name]
+        right = type(value) is _KINDS.get(name, int)
+        if name == "clock":
+            right = right and isfinite(value)
+        elif name == "counters":
+            right = right and all(type(count) is int for count in value.values())
+        elif name not in _KINDS:
+            right = right and 0 <= value < 1 << 64
+        if not right:
+            raise TypeError(f"{name} is {value!r}"[:80])
+    return head
 
 
 def _plain(feedback: Feedback) -> dict[str, Any]:
@@ -144,5 +176,11 @@ def _feedback(plain: dict[str, Any]) -> Feedback:
     arrays = {
         name: None if plain[name] is None else frozen(plain[name]) for name in ("legs", "pose")
     }
+    for name, array in arrays.items():
+        if array is not None and (array.shape != (6,) or not np.isfinite(array).all()):
+            raise ValueError(f"{name} are not six numbers")
+    for name, kind in (("arrival_ns", int), ("state", str), ("estop", bool)):
+        if type(plain[name]) is not kind:
+            raise TypeError(f"{name} is {plain[name]!r}"[:80])
     faults = tuple(str(fault) for fault in plain["faults"])
     return Feedback(**plain | arrays | {"phase": Phase(plain["phase"]), "faults": faults})
