@@ -100,6 +100,7 @@ class Guard:
             self._unsent_ns = 0
             return
         record.playback, self.owes_sample = self._before, self._owed
+        self.supervisor.excuse_plans(record.accepted_ns, now_ns)
         self._unsent_ns = self._unsent_ns or now_ns
         unheard = (now_ns - self._unsent_ns) / SECOND
         if record.state in RAISED and unheard > self.config.patience.feedback:

@@ -137,12 +137,16 @@ class Supervisor:
         if source.silent_for(now_ns) > patience.silence:
             yield Event.SOURCE_SILENT
 
+    def excuse_plans(self, accepted_ns: int, now_ns: int) -> None:
+        """The plan's clock stood still: what was planned on could not be accepted; wait anew."""
+        self._excused = (accepted_ns, now_ns)
+
     def resume(self, feedback: Feedback | None, accepted_ns: int, now_ns: int) -> None:
         """Take the place of a supervisor that ended: answers and plans are waited for anew."""
         if feedback is not None:
             self.device.answered(feedback)
             self.device.excuse(now_ns)
-        self._excused = (accepted_ns, now_ns)
+        self.excuse_plans(accepted_ns, now_ns)
 
     def why(self, event: Event, now_ns: int) -> str:
         """What happened, with its figures, for people."""

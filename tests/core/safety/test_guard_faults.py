@@ -197,6 +197,20 @@ def test_a_network_that_refuses_for_a_moment_pauses_the_plan():
     legal(b)
 
 
+def test_a_network_that_refuses_for_a_moment_is_no_lack_of_plans():
+    b = in_state("RUN")
+    b.run(0.5)
+    b.planning = False
+    b.device.unreachable = True
+    b.run(0.06)
+    b.device.unreachable, b.planning = False, True
+    b.run(0.5)
+    assert b.state == "RUN"
+    assert b.seen[-1] == "RUN"
+    assert b.seen.count("HOLD") == 0
+    legal(b)
+
+
 @pytest.mark.parametrize("state", ["READY", "RUN", "HOLD", "PARKING"])
 @pytest.mark.parametrize("seconds", [0.4, 2.0])
 def test_a_network_that_refuses_is_a_fault(state, seconds):
