@@ -179,8 +179,9 @@ class GuardLoop:
             gc.collect()
         self._maybe_end(now)
         is_last = self._done is not None and self._done.done()
-        # a tick has room for one of the two, a snapshot or slices of a check
-        if is_last or (now - self._snapshot_ns > SNAPSHOT_NS and not self.guard.is_checking):
+        # a short tick has room for one of the two, a snapshot or slices of a check
+        is_busy = self.guard.is_checking or self.guard.judged is not None
+        if is_last or now - self._snapshot_ns > SNAPSHOT_NS * (3 if is_busy else 1):
             self._snapshot_ns = now
             self._show(now)
 

@@ -213,7 +213,7 @@ def test_the_command_writes_what_it_prints(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("what", "seconds", "ticks", "message"),
     [
-        ("everything", 1.0, 5, "bench: unknown 'everything'. Allowed: loop, plan, latency, all"),
+        ("everything", 1.0, 5, "bench: unknown 'everything'. Allowed: loop, guard, flood"),
         ("plan", 1.0, 0, "--ticks: 0 is out of range. Give 1 to 360000"),
         ("plan", 1.0, 10**6, "--ticks"),
         ("loop", 0.0, None, "--seconds: 0 s is out of range. Give 0.01 to 3600 s"),

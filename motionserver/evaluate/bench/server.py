@@ -191,6 +191,7 @@ class BenchServer:
         source = {"kind": "native", "listen": f"127.0.0.1:{self.cue_port}"}
         if self._key:
             file = self._folder / "key"
+            file.touch(mode=0o600)
             file.write_bytes(self._key)
             source["key_file"] = str(file)
         return {
