@@ -15,6 +15,7 @@ from motionserver.web.connection import PatientLoop, PatientProtocol
 from motionserver.web.wiring import wired_app
 
 _NICENESS = 10
+_BACKLOG = 32
 
 
 def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
@@ -30,6 +31,8 @@ def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
             ws="none",
             lifespan="on",
             loop=f"{PatientLoop.__module__}:{PatientLoop.__name__}",
+            # asyncio tries and reports as many accepts in a row when descriptors run out
+            backlog=_BACKLOG,
             timeout_keep_alive=5,
             timeout_graceful_shutdown=1,
             h11_max_incomplete_event_size=16 * 1024,
