@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from motionserver.core.axes import Array
-from motionserver.core.kinematics.hexapod import leg_motion
+from motionserver.core.kinematics.hexapod import leg_speeds
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.guard.options import GuardOptions
@@ -40,9 +40,7 @@ def snapshot(
     record, machine = guard.record, guard.machine
     watch = guard.supervisor.device
     state = setpoint.state
-    _, speeds, _ = leg_motion(
-        machine, state.pose[None], state.velocity[None], state.acceleration[None]
-    )
+    _, speeds = leg_speeds(machine, state.pose[None], state.velocity[None])
     playback = record.playback
     measured = watch.legs()
     newest = watch.newest

@@ -138,7 +138,7 @@ class CoarseGuard:
             "accept_proposal", lambda m, plan, parent, clock, homes: (id(plan), id(parent), clock)
         )
         known("forward", lambda m, legs: (legs.tobytes(),))
-        known("leg_motion", lambda m, *state: tuple(map(bytes, state)))
+        known("leg_speeds", lambda m, *state: tuple(map(bytes, state)))
         known("state_now", lambda playback: (id(playback.playing), playback.clock))
 
     def node(self, now, engaged, asked):

@@ -85,6 +85,20 @@ def _jacobian(seen: LegDirections) -> Array:
     return rows
 
 
+def leg_speeds(machine: Machine, pose: Array, velocity: Array) -> tuple[Array, Array]:
+    """Leg lengths [m] and speeds [m/s] of moving poses: `leg_motion` to the bit, in a third.
+
+    Args:
+        machine: Geometry.
+        pose: (N, 6).
+        velocity: (N, 6).
+    """
+    omega = np.einsum("nij,nj->ni", euler_rate_matrix(pose[:, 3:]), velocity[:, 3:])
+    seen = leg_directions(machine, pose)
+    motion = velocity[:, None, :3] + _cross(omega[:, None, :], seen.arms)
+    return seen.lengths, np.einsum("nij,nij->ni", seen.unit, motion)
+
+
 def leg_motion(
     machine: Machine, pose: Array, velocity: Array, acceleration: Array
 ) -> tuple[Array, Array, Array]:
@@ -122,6 +136,15 @@ def leg_motion(
         + (np.einsum("nij,nij->ni", motion, motion) - speeds**2) / lengths
     )
     return lengths, speeds, accelerations
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Vector products along the last axis, without what np.cross spends on choosing axes."""
+    out: Array = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    out[..., 2] = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return out
 
 
 def joint_angles(machine: Machine, poses: Array, seen: LegDirections | None = None) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from motionserver.core.axes import Array, frozen
 from motionserver.core.device import Order
 from motionserver.core.kinematics.forward import NoPoseError, forward
-from motionserver.core.kinematics.hexapod import leg_lengths, leg_motion
+from motionserver.core.kinematics.hexapod import leg_lengths, leg_speeds
 from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.plan import Plan
 from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
@@ -197,9 +197,7 @@ class Guard:
             state = PlatformState.at_rest(NEUTRAL)
         else:
             state = state_now(record.playback)
-        legs, speeds, _ = leg_motion(
-            self.machine, state.pose[None], state.velocity[None], state.acceleration[None]
-        )
+        legs, speeds = leg_speeds(self.machine, state.pose[None], state.velocity[None])
         inside = (legs[0] >= self.machine.leg_min) & (legs[0] <= self.machine.leg_max)
         if not bool(inside.all()):
             # cannot happen on an accepted plan: if it does, stand where the platform was last sent

@@ -18,6 +18,7 @@ from motionserver.core.kinematics.hexapod import (
     leg_directions,
     leg_lengths,
     leg_motion,
+    leg_speeds,
     neutral_conditioning,
 )
 
@@ -109,6 +110,9 @@ def test_speed_and_acceleration_are_the_derivatives(machine, share, rate, bend):
     assert speed[0] == pytest.approx((legs[3] - legs[1]) / (2 * h), abs=1e-5)
     assert second[0] == pytest.approx((legs[3] - 2 * legs[2] + legs[1]) / h**2, abs=1e-5)
     assert jacobian(machine, pose[None])[0] @ velocity == pytest.approx(speed[0], abs=1e-12)
+    lengths_now, speeds_now = leg_speeds(machine, pose[None], velocity[None])
+    np.testing.assert_array_equal(speeds_now, speed)
+    np.testing.assert_array_equal(lengths_now, leg_directions(machine, pose[None]).lengths)
 
 
 @pytest.mark.parametrize("machine", [compact(), science_fit()], ids=lambda m: m.name)
