@@ -90,10 +90,30 @@ class PatientProtocol(H11Protocol):
 
 
 class PatientLoop(asyncio.SelectorEventLoop):
-    """An event loop whose servers do not wait a minute for a handshake that does not come."""
+    """An event loop whose servers do not wait a minute for a handshake that does not come.
+
+    Nor do they fill the log: what goes wrong with every connection is told once a second.
+    """
 
     handshake: ClassVar[float] = 5.0
     """Time a TLS handshake may take [s]."""
+    told_every: ClassVar[float] = 1.0
+    """Time between two reports of trouble [s]."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._told_at = float("-inf")
+        self._untold = 0
+
+    def call_exception_handler(self, context: dict[str, Any]) -> None:
+        """Tell what went wrong, unless something was told just now."""
+        if self.time() - self._told_at < self.told_every:
+            self._untold += 1
+            return
+        if self._untold:
+            context["message"] = f"{context.get('message')} ({self._untold} others untold)"
+        self._told_at, self._untold = self.time(), 0
+        super().call_exception_handler(context)
 
     async def create_server(self, *args: Any, **named: Any) -> asyncio.Server:  # noqa: ANN401
         """Listen; with TLS, with patience that ends."""

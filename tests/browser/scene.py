@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from motionserver.core.axes import frozen
-from motionserver.core.kinematics.hexapod import leg_motion
+from motionserver.core.kinematics.hexapod import leg_speeds
 from motionserver.core.kinematics.rotation import felt
 from motionserver.core.limits import Machine, Pace, machine_to_mapping
 from motionserver.settings.fields import algorithms
@@ -146,7 +146,7 @@ class Scene:
     def guard(self):
         t = time.monotonic() - self.started
         q, v, a = self.motion(t)
-        legs, speed, _ = (row[0] for row in leg_motion(self.machine, q[None], v[None], a[None]))
+        legs, speed = (row[0] for row in leg_speeds(self.machine, q[None], v[None]))
         m = self.machine
         return {
             "pid": os.getpid(),

@@ -195,3 +195,19 @@ async def test_a_tls_handshake_that_does_not_come_is_not_waited_for():
         assert seen == {}
     finally:
         loop.close()
+
+
+def test_trouble_with_every_connection_is_told_once_a_second():
+    told = []
+    loop = PatientLoop()
+    try:
+        loop.set_exception_handler(lambda _, context: told.append(context["message"]))
+        now = 100.0
+        loop.time = lambda: now
+        for k in range(2048):
+            loop.call_exception_handler({"message": f"no descriptor {k}"})
+        now += 1.0
+        loop.call_exception_handler({"message": "still none"})
+    finally:
+        loop.close()
+    assert told == ["no descriptor 0", "still none (2047 others untold)"]

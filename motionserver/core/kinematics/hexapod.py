@@ -10,7 +10,6 @@ import numpy as np
 from motionserver.core.axes import Array, Bools, frozen
 from motionserver.core.kinematics.rotation import (
     euler_rate_matrix,
-    euler_rate_matrix_dot,
     rotation,
     rotation_rows,
 )
@@ -75,23 +74,19 @@ def jacobian(machine: Machine, poses: Array) -> Array:
 
 def _jacobian(seen: LegDirections) -> Array:
     """Rows [n_i, R P_i x n_i] for the twist (v, omega) in world axes, (N, 6, 6)."""
-    unit, arms = seen.unit, seen.arms
-    rows = np.empty((len(unit), 6, 6))
-    rows[..., :3] = unit
-    # written out: np.cross costs several times the arithmetic at these sizes
-    rows[..., 3] = arms[..., 1] * unit[..., 2] - arms[..., 2] * unit[..., 1]
-    rows[..., 4] = arms[..., 2] * unit[..., 0] - arms[..., 0] * unit[..., 2]
-    rows[..., 5] = arms[..., 0] * unit[..., 1] - arms[..., 1] * unit[..., 0]
-    return rows
+    return np.concatenate((seen.unit, _cross(seen.arms, seen.unit)), axis=-1)
 
 
 def leg_speeds(machine: Machine, pose: Array, velocity: Array) -> tuple[Array, Array]:
-    """Leg lengths [m] and speeds [m/s] of moving poses: `leg_motion` to the bit, in a third.
+    """Leg lengths and speeds of moving poses: l' = n . (p' + omega x RP).
 
     Args:
         machine: Geometry.
         pose: (N, 6).
         velocity: (N, 6).
+
+    Returns:
+        Lengths [m], speeds [m/s], each (N, 6).
     """
     omega = np.einsum("nij,nj->ni", euler_rate_matrix(pose[:, 3:]), velocity[:, 3:])
     seen = leg_directions(machine, pose)
@@ -99,47 +94,8 @@ def leg_speeds(machine: Machine, pose: Array, velocity: Array) -> tuple[Array, A
     return seen.lengths, np.einsum("nij,nij->ni", seen.unit, motion)
 
 
-def leg_motion(
-    machine: Machine, pose: Array, velocity: Array, acceleration: Array
-) -> tuple[Array, Array, Array]:
-    """Leg lengths, speeds and accelerations of moving poses.
-
-    l'' = n . L'' + (|L'|^2 - l'^2) / l with L'' = p'' + omega' x RP + omega x (omega x RP).
-
-    Args:
-        machine: Geometry.
-        pose: (N, 6).
-        velocity: (N, 6).
-        acceleration: (N, 6).
-
-    Returns:
-        Lengths [m], speeds [m/s], accelerations [m/s2], each (N, 6).
-    """
-    angles, angle_rates = pose[:, 3:], velocity[:, 3:]
-    to_world = euler_rate_matrix(angles)
-    omega = np.einsum("nij,nj->ni", to_world, angle_rates)
-    omega_dot = np.einsum("nij,nj->ni", to_world, acceleration[:, 3:]) + np.einsum(
-        "nij,nj->ni", euler_rate_matrix_dot(angles, angle_rates), angle_rates
-    )
-    seen = leg_directions(machine, pose)
-    lengths, unit, arms = seen.lengths, seen.unit, seen.arms
-    spin = omega[:, None, :]
-    motion = velocity[:, None, :3] + np.cross(spin, arms)
-    second = (
-        acceleration[:, None, :3]
-        + np.cross(omega_dot[:, None, :], arms)
-        + np.cross(spin, np.cross(spin, arms))
-    )
-    speeds = np.einsum("nij,nij->ni", unit, motion)
-    accelerations = (
-        np.einsum("nij,nij->ni", unit, second)
-        + (np.einsum("nij,nij->ni", motion, motion) - speeds**2) / lengths
-    )
-    return lengths, speeds, accelerations
-
-
 def _cross(a: Array, b: Array) -> Array:
-    """Vector products along the last axis, without what np.cross spends on choosing axes."""
+    """Vector products along the last axis; np.cross costs several times the arithmetic here."""
     out: Array = np.empty(np.broadcast_shapes(a.shape, b.shape))
     out[..., 0] = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
     out[..., 1] = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]

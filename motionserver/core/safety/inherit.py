@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.device import Phase
-from motionserver.core.kinematics.hexapod import leg_motion
+from motionserver.core.kinematics.hexapod import leg_speeds
 from motionserver.core.motion.player import Playback, state_now
 from motionserver.core.safety.accept import accept_again
 from motionserver.core.safety.act import Guard
@@ -73,9 +73,7 @@ def _astray(guard: Guard, will: Will, playback: Playback) -> str:
     if will.feedback is None or will.feedback.phase is not Phase.UP:
         return ""
     state = state_now(playback)
-    legs, speeds, _ = leg_motion(
-        guard.machine, state.pose[None], state.velocity[None], state.acceleration[None]
-    )
+    legs, speeds = leg_speeds(guard.machine, state.pose[None], state.velocity[None])
     measured = measured_legs(guard.machine, will.feedback)
     if measured is None:
         return ""

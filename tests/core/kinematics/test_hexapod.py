@@ -17,7 +17,6 @@ from motionserver.core.kinematics.hexapod import (
     joint_angles,
     leg_directions,
     leg_lengths,
-    leg_motion,
     leg_speeds,
     neutral_conditioning,
 )
@@ -100,19 +99,15 @@ def test_lengths_agree_with_another_rotation(machine, share):
 
 
 @pytest.mark.parametrize("machine", [compact(), science_fit()], ids=lambda m: m.name)
-@given(shares, shares, shares)
-def test_speed_and_acceleration_are_the_derivatives(machine, share, rate, bend):
-    pose, velocity, acceleration = share * machine.box, rate * 0.5, bend * 5.0
+@given(shares, shares)
+def test_speed_is_the_derivative(machine, share, rate):
+    pose, velocity = share * machine.box, rate * 0.5
     h = 1e-4
-    times = np.array([-2, -1, 0, 1, 2])[:, None] * h
-    legs = lengths(machine, pose + velocity * times + acceleration * times**2 / 2)
-    _, speed, second = leg_motion(machine, pose[None], velocity[None], acceleration[None])
-    assert speed[0] == pytest.approx((legs[3] - legs[1]) / (2 * h), abs=1e-5)
-    assert second[0] == pytest.approx((legs[3] - 2 * legs[2] + legs[1]) / h**2, abs=1e-5)
+    legs = lengths(machine, pose + velocity * np.array([[-h], [0.0], [h]]))
+    found, speed = leg_speeds(machine, pose[None], velocity[None])
+    assert found[0] == pytest.approx(legs[1], abs=1e-13)
+    assert speed[0] == pytest.approx((legs[2] - legs[0]) / (2 * h), abs=1e-5)
     assert jacobian(machine, pose[None])[0] @ velocity == pytest.approx(speed[0], abs=1e-12)
-    lengths_now, speeds_now = leg_speeds(machine, pose[None], velocity[None])
-    np.testing.assert_array_equal(speeds_now, speed)
-    np.testing.assert_array_equal(lengths_now, leg_directions(machine, pose[None]).lengths)
 
 
 @pytest.mark.parametrize("machine", [compact(), science_fit()], ids=lambda m: m.name)
