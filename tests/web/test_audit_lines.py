@@ -222,6 +222,17 @@ def test_a_chain_of_all_kinds_of_lines_is_whole_over_rotations(tmp_path, world):
     assert not verify_text(path, None, "")[1]
 
 
+def test_a_writer_sees_what_another_wrote_and_put_aside(tmp_path):
+    path = tmp_path / "audit.jsonl"
+    writers = [Audit(path, 2000) for _ in range(3)]
+    for number in range(60):
+        writers[number % 3].write({"action": "tune", "number": number})
+        text, is_whole = verify_text(path, None, "")
+        assert is_whole, text
+    assert rotated(path).exists()
+    assert [one.lost for one in writers] == [0, 0, 0]
+
+
 def write_many(path, who):
     audit = Audit(path, 4000)
     for number in range(60):

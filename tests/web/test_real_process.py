@@ -118,6 +118,15 @@ def test_nothing_secret_is_told_or_written(site):
     assert (site.folder / "audit.jsonl").stat().st_size > 0
 
 
+def test_the_process_watches_who_drives(site):
+    pause, path = threading.Event(), site.folder / "audit.jsonl"
+    for _ in range(1200):
+        if path.exists() and '"client takeover"' in path.read_text():
+            return
+        pause.wait(0.05)
+    raise AssertionError("nobody watched")
+
+
 def test_a_flood_of_nonsense_does_not_fill_the_log(site):
     before = len(site.written())
     for _ in range(40):

@@ -156,13 +156,13 @@ def deep_json(site, number):
 def huge_headers(site, number):
     """One header of megabytes, very many small ones, and a path without end."""
     for sent in (
-        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-A: " + b"a" * 4_000_000,
-        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X-A: b\r\n" * 500_000,
-        b"GET /" + b"a" * 4_000_000,
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-A: " + b"a" * 32_000_000,
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"X-A: b\r\n" * 4_000_000,
+        b"GET /" + b"a" * 32_000_000,
     ):
         for _ in range(number):
             with site.connect() as link:
-                with contextlib.suppress(*GONE):
+                with pytest.raises(GONE):
                     link.sendall(sent)
                 line = reply(link)
                 assert line == b"" or line.split()[1] in (b"400", b"414", b"431"), line
@@ -197,11 +197,11 @@ def _pour(link, data):
 
 
 ATTACKS = {
-    slowloris: (60, 200),
+    slowloris: (200, 600),
     endless_body: (64, 1024),
     upgrades: (400, 10_000),
     deep_json: (1, 20),
-    huge_headers: (1, 10),
+    huge_headers: (1, 5),
     pipelining: (500, 20_000),
 }
 """Size of each attack: as an ordinary test, and in full."""
