@@ -213,7 +213,7 @@ def reproduce(
 
 @app.command()
 def bench(
-    what: Annotated[str, typer.Argument(help="loop, plan, latency or all")] = "all",
+    what: Annotated[str, typer.Argument(help="loop, guard, flood, plan, latency or all")] = "all",
     seconds: Annotated[
         float, typer.Option("--seconds", help="length of each part", metavar="S")
     ] = 20.0,
