@@ -142,9 +142,9 @@ def unpack_will(data: bytes) -> Will:
             plans=tuple(plans),
         )
     except (LookupError, TypeError, ArithmeticError, RecursionError, struct.error) as error:
-        raise ValueError(f"will of a guard: {type(error).__name__}: {error}") from error
+        raise ValueError(f"will of a guard: {type(error).__name__}: {error}"[:200]) from error
     except ValueError as error:
-        raise ValueError(f"will of a guard: {error}") from error
+        raise ValueError(f"will of a guard: {error}"[:200]) from error
 
 
 def _checked(head: Any) -> dict[str, Any]:  # noqa: ANN401  (whatever JSON holds)
