@@ -215,10 +215,12 @@ def load_config(path: Path | None, overrides: Mapping[str, Any] | None = None) -
         except UnicodeDecodeError as error:
             raise ConfigError(str(path), f"not TOML: {error}", "Correct the syntax.") from error
         data = _merged(read_toml(text, str(path)), data)
-    # pydantic-settings would take them for its own options, and look for values elsewhere
+    # pydantic-settings would take the first for its own options and look for values elsewhere, and
+    # the second for a section of that name, beside one that has it
+    known = sorted(Config.model_fields)
     for key in data:
-        if key.startswith("_"):
-            raise unknown_key(f"{path}: {key}", key, sorted(Config.model_fields))
+        if key.startswith("_") or (key not in known and key.lower() in known):
+            raise unknown_key(f"{path}: {key}", key, known)
     try:
         return Config(**data)
     except ValidationError as error:

@@ -14,6 +14,8 @@ from motionserver.errors import ConfigError
 
 _SHOWN: Final = 80
 """Most characters of a wrong value that are shown."""
+_WHERE: Final = 300
+"""Most characters of a place that are shown."""
 
 
 def read_toml(text: str, where: str) -> dict[str, Any]:
@@ -40,7 +42,7 @@ def unknown_key(where: str, key: str, known: list[str], tail: str = "") -> Confi
     """Word the refusal of a key that does not exist, with the most similar one that does."""
     close = difflib.get_close_matches(key, known, 1)
     hint = f"Did you mean {close[0]!r}?" if close else f"Allowed: {', '.join(known)}."
-    return ConfigError(where, f"unknown key {key!r}", hint + tail)
+    return ConfigError(where[:_WHERE], f"unknown key {key[:_SHOWN]!r}", hint + tail)
 
 
 def config_error(
@@ -59,23 +61,24 @@ def config_error(
     """
     # a mistyped key is missing as well: say what was typed
     first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-    keys = [str(part) for part in first["loc"]]
-    where = f"{path}{_line(text, keys)}: " if path is not None else ""
+    place = first["loc"]
+    keys = [str(part) for part in place]
+    where = f"{path}{_line(text, place)}: " if path is not None else ""
     where += ".".join(keys) or "the whole file"
     more = len(error.errors()) - 1
     tail = f" ({more} more after this one)" if more else ""
     if first["type"] == "extra_forbidden":
-        return unknown_key(where, keys[-1], _known(model, keys[:-1]), tail)
+        return unknown_key(where, keys[-1], _known(model, place[:-1]), tail)
     found = first.get("input")
     shown = "" if isinstance(found, dict | list) else f", found {repr(found)[:_SHOWN]}"
-    return ConfigError(where, f"{first['msg']}{shown}", f"Correct this value.{tail}")
+    return ConfigError(where[:_WHERE], f"{first['msg']}{shown}", f"Correct this value.{tail}")
 
 
-def _line(text: str, keys: list[str]) -> str:
+def _line(text: str, place: tuple[int | str, ...]) -> str:
     """Line of the key, searched inside its own section; of the section if the key is missing."""
     lines = text.splitlines()
-    names = [key for key in keys if not key.isdigit()]
-    index = next((int(key) for key in keys if key.isdigit()), 0)
+    names = [key for key in place if isinstance(key, str)]
+    index = next((key for key in place if isinstance(key, int)), 0)
     found, begin = 0, 0
     for depth in range(len(names), 0, -1):
         section = r"\s*\.\s*".join(re.escape(name) for name in names[:depth])
@@ -97,10 +100,10 @@ def _line(text: str, keys: list[str]) -> str:
     return f":{found}" if found else ""
 
 
-def _known(model: type[BaseModel], keys: list[str]) -> list[str]:
+def _known(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     current: object = model
-    for key in keys:
-        if key.isdigit():
+    for key in place:
+        if isinstance(key, int):
             continue
         if isinstance(current, type) and issubclass(current, BaseModel):
             field = current.model_fields.get(key)

@@ -56,6 +56,10 @@ def test_the_defaults_run_on_loopback():
         ("sources = 5\n", "c.toml:1: sources", "list"),
         ("web = 5\n", "c.toml:1: web", "WebSection"),
         ("web.port = 'x'\n", "web.port", "integer"),
+        ("[platForm]\nport = 5\n", "c.toml: platForm", "Did you mean 'platform'?"),
+        ("[web]\n7 = 1\n", "c.toml:2: web.7", "Allowed: allowed_hosts"),
+        (f"[web]\n{'9' * 4400} = 1\n", "c.toml:2: web.999", "unknown key"),
+        (f"{'9' * 4400} = 1\n", "c.toml:1: 999", "unknown key"),
     ],
 )
 def test_what_is_wrong_is_told_with_file_line_key_and_cure(tmp_path, text, where, what):
