@@ -32,9 +32,9 @@ MOST_SENDERS = 8
 """Senders per input whose format is remembered; more are strangers, and start anew."""
 
 
-UNPROVEN = {"size", "magic", "byte_order", "version", "incompat", "length", "checksum"}
-UNPROVEN |= {"hmac_missing", "hmac_wrong", "hmac_unexpected"}
-"""Refusals of packets that need not be the owner's where the owner signs: anybody can send them."""
+DAMAGED = {"size", "magic", "byte_order", "version", "incompat", "length", "checksum"}
+DAMAGED |= {"hmac_missing", "hmac_wrong", "hmac_unexpected"}
+"""Refusals of packets that are not as the owner sent them: a bad wire, or somebody in his name."""
 Datagrams = list[tuple[bytes, str, int]]
 """Bytes, sender, arrival [ns]."""
 
@@ -208,7 +208,7 @@ class Inputs:
             return source.decode(data, address, arrival_ns)
         except SourceError as error:
             self._refused(error.reason, f"{source.name} from {address}: {error}")
-            if source.options.key is None or error.reason not in UNPROVEN:
+            if error.reason not in DAMAGED:
                 self.vehicle.spoilt(source.name, address, arrival_ns)
         except Exception as error:
             # a third party's format that stumbles costs its packet, not the period

@@ -196,16 +196,17 @@ class F4(ClientFault):
     number = 4
     title = "wrong size, magic, version, byte order"
     detection = "length, magic, version, checksum, range"
-    reaction = "dropped and counted; more than 10 % of the owner's over 1 s: HOLD"
+    reaction = "dropped and counted; the drive goes on with what is left, without any as F1"
     recovery = "automatic"
     counter = "refused"
+    returns = True
 
     def __init__(self, world, rng):
         super().__init__(world, rng)
         self.kind = rng.choice(("stranger", "few", "many"))
         self.seconds = rng.uniform(1.3, 2.2)
-        self.share = {"stranger": 0.9, "few": 0.04, "many": 0.6}[self.kind]
-        self.returns = self.stays = self.kind != "many"
+        self.share = {"stranger": 0.9, "few": 0.04, "many": 0.3}[self.kind]
+        self.stays = self.kind != "many"
 
     def strike(self):
         self.client.spoil.append(self._spoil)
@@ -233,12 +234,6 @@ class F4(ClientFault):
 
     def relent(self):
         self.client.spoil.remove(self._spoil)
-
-    def reacted(self):
-        return self.has_left_run if self.kind == "many" else super().reacted()
-
-    def bound(self):
-        return super().bound() if self.stays else 1.0 + STALE + self.world.period + 2 * TICK
 
 
 class F5(ClientFault):
