@@ -18,20 +18,32 @@ from mutation.mutants import Mutant, mutants_of, unchanged
 
 ROOT = Path(__file__).parents[2]
 NAMED = Path(__file__).with_name("equivalent.toml")
-_VERDICTS = [
-    f"tests/core/safety/test_{name}.py"
-    for name in ("accept", "shape", "verify", "verify_limits", "verdict")
-]
+SAFETY = "motionserver/core/safety"
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     "motionserver/core/intake": ["tests/intake"],
-    "motionserver/core/plan.py": ["tests/core/test_plan.py", "tests/core/safety/test_shape.py"],
+    "motionserver/core/plan.py": ["tests/core/test_plan.py"],
     "motionserver/core/motion": ["tests/core/motion"],
-    "motionserver/core/safety/accept.py": _VERDICTS,
-    "motionserver/core/safety/shape.py": _VERDICTS,
-    "motionserver/core/safety/verdict.py": _VERDICTS,
-    "motionserver/core/safety/verify.py": _VERDICTS,
-    "motionserver/core/safety": ["tests/core/safety", "tests/house/test_state_diagram.py"],
+    f"{SAFETY}/accept.py": [
+        "tests/core/safety/test_accept.py",
+        "tests/core/safety/test_accept_bounds.py",
+    ],
+    f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
+    f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit.py"],
+    f"{SAFETY}/record.py": ["tests/core/safety/test_record.py"],
+    f"{SAFETY}/shape.py": ["tests/core/safety/test_shape.py", "tests/core/safety/test_verify.py"],
+    f"{SAFETY}/states.py": [
+        "tests/core/safety/test_states.py",
+        "tests/house/test_state_diagram.py",
+    ],
+    f"{SAFETY}/verdict.py": ["tests/core/safety/test_verdict.py"],
+    f"{SAFETY}/verify.py": [
+        "tests/core/safety/test_verify.py",
+        "tests/core/safety/test_verify_limits.py",
+    ],
+    f"{SAFETY}/watchdog.py": ["tests/core/safety/test_watchdog.py"],
+    f"{SAFETY}/will.py": ["tests/core/safety/test_inherit.py"],
+    SAFETY: ["tests/core/safety"],
 }
 """Which tests must kill the mutants of which files: those near them; the first that fits counts."""
 
