@@ -24,6 +24,8 @@ SUITES = {
     "motionserver/core/intake": ["tests/intake"],
     "motionserver/core/plan.py": ["tests/core/test_plan.py"],
     "motionserver/core/motion": ["tests/core/motion"],
+    f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
+    f"{SAFETY}/slices.py": ["tests/core/safety/test_patient.py"],
     f"{SAFETY}/accept.py": [
         "tests/core/safety/test_accept.py",
         "tests/core/safety/test_accept_bounds.py",

@@ -79,6 +79,30 @@ def test_tracking_is_by_leg_with_room_for_speed_and_time():
     assert not device.track(300 * MS, far, ZERO)
 
 
+def test_a_platform_stands_once_its_legs_have_quivered_no_more_than_2_mm_for_a_while():
+    device = watch()
+    assert device.stands(0), "nothing is measured"
+    device.answered(answer(0, legs=ZERO))
+    assert not device.stands(299 * MS)
+    assert device.stands(300 * MS)
+    quiver = np.array([0.0, 0.0, 0.002, 0.0, 0.0, -0.002])
+    for at in (90, 180, 270):
+        device.answered(answer(at, legs=quiver))
+    assert device.stands(300 * MS)
+    device.answered(answer(310, legs=ZERO + [0.0, 0.0, 0.0021, 0.0, 0.0, 0.0]))
+    assert not device.stands(609 * MS)
+    assert device.stands(610 * MS)
+
+
+def test_after_a_silence_it_must_stand_anew_and_what_is_not_measured_stands():
+    device = watch()
+    device.answered(answer(0, legs=ZERO))
+    device.answered(answer(500, legs=ZERO))
+    assert not device.stands(799 * MS)
+    device.answered(answer(900))
+    assert device.stands(900 * MS)
+
+
 def test_the_age_of_an_answer():
     device = watch()
     device.answered(answer(1000))
@@ -152,6 +176,8 @@ def test_how_long_each_silence_is_borne():
         "track": 0.010,
         "track_lag": 0.15,
         "track_time": 0.1,
+        "still": 0.3,
+        "quiver": 0.002,
     }
 
 
