@@ -89,7 +89,7 @@ def test_a_platform_stands_once_its_legs_have_quivered_no_more_than_2_mm_for_a_w
     for at in (90, 180, 270):
         device.answered(answer(at, legs=quiver))
     assert device.stands(300 * MS)
-    device.answered(answer(310, legs=ZERO + [0.0, 0.0, 0.0021, 0.0, 0.0, 0.0]))
+    device.answered(answer(310, legs=np.array([0.0, 0.0, 0.0021, 0.0, 0.0, 0.0])))
     assert not device.stands(609 * MS)
     assert device.stands(610 * MS)
 
