@@ -17,6 +17,7 @@ from mutation.children import each
 from mutation.mutants import Mutant, mutants_of, unchanged
 
 ROOT = Path(__file__).parents[2]
+ALIVE = ("survived", farm.NEVER)
 NAMED = Path(__file__).with_name("equivalent.toml")
 SAFETY = "motionserver/core/safety"
 SUITES = {
@@ -96,7 +97,8 @@ def tried(mutants: list[Mutant], tests: list[str], workers: int) -> dict[str, st
         order = sorted(seconds, key=lambda name: (name not in near, seconds[name]))
         return farm.try_anew(ROOT, mutant, order, seconds)
 
-    outer = [m for m in mutants if not m.function or fates[m.name] == farm.NEVER]
+    # what lives may have done its work at import, before it was exchanged
+    outer = [m for m in mutants if not m.function or fates[m.name] in ALIVE]
     for _, said in each([unchanged(ROOT, m.file) for m in outer[:1]], anew, 1, farm.PATIENCE):
         if said != "survived":
             sys.exit(f"fails without any change: {said}")
@@ -139,7 +141,7 @@ def main() -> int:
         mine = [m for m in mutants if suites[m.name] == tests]
         mine = [m for m in mine if given.named or m.name not in known]
         fates |= tried(mine, list(tests), given.workers) if mine else {}
-    alive = {name for name, said in fates.items() if said in ("survived", farm.NEVER)}
+    alive = {name for name, said in fates.items() if said in ALIVE}
     wrong = [name for name in known if name in fates and name not in alive]
     _table(mutants, fates, known, alive)
     print(f"{len(fates)} tried in {time.monotonic() - began:.0f} s")
