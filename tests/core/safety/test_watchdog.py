@@ -30,6 +30,7 @@ def test_before_the_first_answer():
     device.excuse(5)
     assert device.is_lost(6)
     assert device.track(5, ZERO, ZERO) is False
+    assert device.error == 0.0
 
 
 @pytest.mark.parametrize(("period", "late_ms"), [(1 / 60, 100), (0.02, 120), (0.05, 300)])
@@ -58,6 +59,7 @@ def test_an_excuse_holds_once_and_for_one_answer():
     device.excuse(590 * MS)
     assert device.is_lost(601 * MS)
     device.answered(answer(595))
+    assert not device.is_lost(650 * MS)
     assert device.valid_for(600 * MS) == pytest.approx(0.6)
 
 
@@ -82,14 +84,14 @@ def test_tracking_is_by_leg_with_room_for_speed_and_time():
 def test_a_platform_stands_once_its_legs_have_quivered_no_more_than_2_mm_for_a_while():
     device = watch()
     assert device.stands(0), "nothing is measured"
-    device.answered(answer(0, legs=ZERO))
+    device.answered(answer(0, legs=ZERO + 1.2))
     assert not device.stands(299 * MS)
     assert device.stands(300 * MS)
     quiver = np.array([0.0, 0.0, 0.002, 0.0, 0.0, -0.002])
     for at in (90, 180, 270):
-        device.answered(answer(at, legs=quiver))
+        device.answered(answer(at, legs=1.2 + quiver))
     assert device.stands(300 * MS)
-    device.answered(answer(310, legs=np.array([0.0, 0.0, 0.0021, 0.0, 0.0, 0.0])))
+    device.answered(answer(310, legs=1.2 + 1.05 * np.abs(quiver)))
     assert not device.stands(609 * MS)
     assert device.stands(610 * MS)
 
@@ -107,6 +109,13 @@ def test_the_age_of_an_answer():
     device = watch()
     device.answered(answer(1000))
     assert device.age(1050 * MS) == pytest.approx(0.05)
+
+
+def test_a_platform_that_is_astray_from_the_first_moment_is_told():
+    device = watch()
+    device.answered(answer(0, legs=ZERO))
+    assert not device.track(0, ZERO + 0.011, ZERO)
+    assert device.track(101 * MS, ZERO + 0.011, ZERO)
 
 
 def test_the_room_for_speed_is_by_leg_and_its_edge_is_allowed():
@@ -146,6 +155,7 @@ def test_a_source_is_stale_by_age_and_no_claim_beats_300_ms():
 
 def test_a_source_of_which_nothing_came_is_stale_at_once():
     assert CueStatus(0, 150 * MS).is_stale(100 * MS)
+    assert CueStatus(5).is_stale(6), "no patience was told"
 
 
 def test_silence_counts_from_its_beginning_and_ends_with_a_packet():
