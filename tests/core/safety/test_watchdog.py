@@ -84,14 +84,14 @@ def test_tracking_is_by_leg_with_room_for_speed_and_time():
 def test_a_platform_stands_once_its_legs_have_quivered_no_more_than_2_mm_for_a_while():
     device = watch()
     assert device.stands(0), "nothing is measured"
-    device.answered(answer(0, legs=ZERO + 1.2))
+    device.answered(answer(0, legs=ZERO + 0.002))
     assert not device.stands(299 * MS)
     assert device.stands(300 * MS)
     quiver = np.array([0.0, 0.0, 0.002, 0.0, 0.0, -0.002])
     for at in (90, 180, 270):
-        device.answered(answer(at, legs=1.2 + quiver))
+        device.answered(answer(at, legs=0.002 + quiver))
     assert device.stands(300 * MS)
-    device.answered(answer(310, legs=1.2 + 1.05 * np.abs(quiver)))
+    device.answered(answer(310, legs=0.002 + 1.05 * np.abs(quiver)))
     assert not device.stands(609 * MS)
     assert device.stands(610 * MS)
 
