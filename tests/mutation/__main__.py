@@ -17,21 +17,37 @@ from mutation.children import each
 from mutation.mutants import Mutant, mutants_of, unchanged
 
 ROOT = Path(__file__).parents[2]
+ALIVE = ("survived", farm.NEVER)
 NAMED = Path(__file__).with_name("equivalent.toml")
-_VERDICTS = [
-    f"tests/core/safety/test_{name}.py"
-    for name in ("accept", "shape", "verify", "verify_limits", "verdict")
-]
+SAFETY = "motionserver/core/safety"
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     "motionserver/core/intake": ["tests/intake"],
-    "motionserver/core/plan.py": ["tests/core/test_plan.py", "tests/core/safety/test_shape.py"],
+    "motionserver/core/plan.py": ["tests/core/test_plan.py"],
     "motionserver/core/motion": ["tests/core/motion"],
-    "motionserver/core/safety/accept.py": _VERDICTS,
-    "motionserver/core/safety/shape.py": _VERDICTS,
-    "motionserver/core/safety/verdict.py": _VERDICTS,
-    "motionserver/core/safety/verify.py": _VERDICTS,
-    "motionserver/core/safety": ["tests/core/safety", "tests/house/test_state_diagram.py"],
+    f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
+    f"{SAFETY}/slices.py": ["tests/core/safety/test_patient.py"],
+    f"{SAFETY}/accept.py": [
+        "tests/core/safety/test_accept.py",
+        "tests/core/safety/test_accept_bounds.py",
+    ],
+    f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
+    f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit.py"],
+    f"{SAFETY}/record.py": ["tests/core/safety/test_record.py"],
+    f"{SAFETY}/shape.py": ["tests/core/safety/test_shape.py", "tests/core/safety/test_verify.py"],
+    f"{SAFETY}/states.py": [
+        "tests/core/safety/test_states.py",
+        "tests/house/test_state_diagram.py",
+    ],
+    f"{SAFETY}/verdict.py": ["tests/core/safety/test_verdict.py"],
+    f"{SAFETY}/verify.py": [
+        "tests/core/safety/test_verify.py",
+        "tests/core/safety/test_verify_limits.py",
+        "tests/core/safety/test_verify_told.py",
+    ],
+    f"{SAFETY}/watchdog.py": ["tests/core/safety/test_watchdog.py"],
+    f"{SAFETY}/will.py": ["tests/core/safety/test_inherit.py"],
+    SAFETY: ["tests/core/safety"],
 }
 """Which tests must kill the mutants of which files: those near them; the first that fits counts."""
 
@@ -81,7 +97,8 @@ def tried(mutants: list[Mutant], tests: list[str], workers: int) -> dict[str, st
         order = sorted(seconds, key=lambda name: (name not in near, seconds[name]))
         return farm.try_anew(ROOT, mutant, order, seconds)
 
-    outer = [m for m in mutants if not m.function or fates[m.name] == farm.NEVER]
+    # what lives may have done its work at import, before it was exchanged
+    outer = [m for m in mutants if not m.function or fates[m.name] in ALIVE]
     for _, said in each([unchanged(ROOT, m.file) for m in outer[:1]], anew, 1, farm.PATIENCE):
         if said != "survived":
             sys.exit(f"fails without any change: {said}")
@@ -124,7 +141,7 @@ def main() -> int:
         mine = [m for m in mutants if suites[m.name] == tests]
         mine = [m for m in mine if given.named or m.name not in known]
         fates |= tried(mine, list(tests), given.workers) if mine else {}
-    alive = {name for name, said in fates.items() if said in ("survived", farm.NEVER)}
+    alive = {name for name, said in fates.items() if said in ALIVE}
     wrong = [name for name in known if name in fates and name not in alive]
     _table(mutants, fates, known, alive)
     print(f"{len(fates)} tried in {time.monotonic() - began:.0f} s")

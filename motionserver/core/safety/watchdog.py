@@ -124,18 +124,18 @@ class DeviceWatch:
         self._machine = machine
         self._patience = patience
         self._late = max(patience.feedback, 6.0 * send_period)
-        self._valid_since: int | None = None
+        self._valid_since: int
         self._astray_since: int | None = None
         self._excused: Feedback | None = None
-        self._excused_ns = 0
+        self._excused_ns: int
         self._still_at: Array | None = None
-        self._still_since = 0
+        self._still_since: int
         self.newest: Feedback | None = None
         self.error = 0.0
 
     def answered(self, feedback: Feedback) -> None:
         """Take a decoded answer."""
-        if self._valid_since is None or self.is_lost(feedback.arrival_ns):
+        if self.is_lost(feedback.arrival_ns):
             self._valid_since = feedback.arrival_ns
             self._still_at = None
         legs = measured_legs(self._machine, feedback)
@@ -159,12 +159,12 @@ class DeviceWatch:
 
     def excuse(self, now_ns: int) -> None:
         """The guard itself stood still, and a base answers what it is sent: wait anew, once."""
-        if self.newest is not None and self._excused is not self.newest:
+        if self._excused is not self.newest:
             self._excused, self._excused_ns = self.newest, now_ns
 
     def valid_for(self, now_ns: int) -> float:
         """How long answers have come without a break [s]."""
-        if self._valid_since is None or self.is_lost(now_ns):
+        if self.is_lost(now_ns):
             return 0.0
         return (now_ns - self._valid_since) / SECOND
 

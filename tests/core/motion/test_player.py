@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 
 from motionserver.core.axes import frozen
 from motionserver.core.motion.moves import rest_to_rest
-from motionserver.core.motion.player import Playback, advance, follow, state_now
+from motionserver.core.motion.player import MOST_PENDING, Playback, advance, follow, state_now
 from motionserver.core.plan import rest_at
 from motionserver.core.safety.verdict import AcceptedPlan
 
@@ -27,6 +29,19 @@ def test_one_plan():
     assert later.remaining == 0.0
     assert later.newest is playback.playing
     assert later.newest_clock == 0.5
+
+
+def test_exactly_at_its_end_a_plan_rests_and_exactly_at_its_instant_the_next_begins():
+    playback = Playback(AcceptedPlan(rest_at(ZERO), None, 1.0), 0.01)
+    assert playback.is_at_rest
+    waiting = follow(replace(playback, clock=0.25), accepted(1, 0.5))
+    assert advance(waiting, 0.125).playing is playback.playing
+    at = advance(waiting, 0.25)
+    assert (at.playing.plan.plan_id, at.clock, at.pending) == (1, 0.0, ())
+
+
+def test_three_plans_may_wait():
+    assert MOST_PENDING == 3
 
 
 def test_plans_take_over_at_their_instants():

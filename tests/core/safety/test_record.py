@@ -40,6 +40,7 @@ def test_what_is_meant_when_nothing_is_said():
     config = GuardConfig(compact(), 1 / 60, 0.01)
     assert config.engage == "console"
     assert not config.dry_run
+    assert config.slices == 0
     assert Request("engage", "http").enabled
     given = TickInput(1, 0.0, is_due=True)
     assert not given.leave

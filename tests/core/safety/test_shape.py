@@ -46,6 +46,11 @@ def test_the_first_later_step_below_eight_milliseconds_is_told():
     assert found.allowed == pytest.approx(0.008 - 1e-9, abs=1e-15)
 
 
+def test_a_step_that_is_just_long_enough_is_not_told_for_a_later_one_that_is_short():
+    found = refused(table(times=[0.0, 1e-4 - 1e-9, 0.5, 0.507, 1.0]))
+    assert found.when == 0.5
+
+
 @pytest.mark.parametrize("field", ["pose", "velocity", "acceleration"])
 def test_numbers_up_to_ten_thousand_are_no_nonsense(field):
     assert refused(edited(field, 1, -1e4)) is None

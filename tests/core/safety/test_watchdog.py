@@ -1,3 +1,5 @@
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 from machines import compact
@@ -28,6 +30,7 @@ def test_before_the_first_answer():
     device.excuse(5)
     assert device.is_lost(6)
     assert device.track(5, ZERO, ZERO) is False
+    assert device.error == 0.0
 
 
 @pytest.mark.parametrize(("period", "late_ms"), [(1 / 60, 100), (0.02, 120), (0.05, 300)])
@@ -56,6 +59,7 @@ def test_an_excuse_holds_once_and_for_one_answer():
     device.excuse(590 * MS)
     assert device.is_lost(601 * MS)
     device.answered(answer(595))
+    assert not device.is_lost(650 * MS)
     assert device.valid_for(600 * MS) == pytest.approx(0.6)
 
 
@@ -77,6 +81,61 @@ def test_tracking_is_by_leg_with_room_for_speed_and_time():
     assert not device.track(300 * MS, far, ZERO)
 
 
+def test_a_platform_stands_once_its_legs_have_quivered_no_more_than_2_mm_for_a_while():
+    device = watch()
+    assert device.stands(0), "nothing is measured"
+    device.answered(answer(0, legs=ZERO + 0.002))
+    assert not device.stands(299 * MS)
+    assert device.stands(300 * MS)
+    quiver = np.array([0.0, 0.0, 0.002, 0.0, 0.0, -0.002])
+    for at in (90, 180, 270):
+        device.answered(answer(at, legs=0.002 + quiver))
+    assert device.stands(300 * MS)
+    device.answered(answer(310, legs=0.002 + 1.05 * np.abs(quiver)))
+    assert not device.stands(609 * MS)
+    assert device.stands(610 * MS)
+
+
+def test_after_a_silence_it_must_stand_anew_and_what_is_not_measured_stands():
+    device = watch()
+    device.answered(answer(0, legs=ZERO))
+    device.answered(answer(500, legs=ZERO))
+    assert not device.stands(799 * MS)
+    device.answered(answer(900))
+    assert device.stands(900 * MS)
+
+
+def test_the_age_of_an_answer():
+    device = watch()
+    device.answered(answer(1000))
+    assert device.age(1050 * MS) == pytest.approx(0.05)
+
+
+def test_a_platform_that_is_astray_from_the_first_moment_is_told():
+    device = watch()
+    device.answered(answer(0, legs=ZERO))
+    assert not device.track(0, ZERO + 0.011, ZERO)
+    assert device.track(101 * MS, ZERO + 0.011, ZERO)
+
+
+def test_the_room_for_speed_is_by_leg_and_its_edge_is_allowed():
+    device = watch()
+    speeds = np.array([0.0, -1.0, 2.0, 0.0, 0.0, 0.0])
+    assert device.allowed(speeds).tolist() == pytest.approx([0.01, 0.16, 0.31, 0.01, 0.01, 0.01])
+    device.answered(answer(0, legs=ZERO))
+    assert not device.track(0, -device.allowed(speeds), speeds)
+    assert device.error == pytest.approx(0.31)
+    assert not device.track(200 * MS, -device.allowed(speeds), speeds)
+
+
+def test_legs_are_believed_before_a_pose_and_nothing_is_made_up():
+    device = watch()
+    device.answered(answer(0, legs=ZERO + 1.2, pose=ZERO))
+    assert (device.legs() == 1.2).all()
+    device.answered(answer(10))
+    assert device.legs() is None
+
+
 def test_a_pose_is_as_good_as_legs():
     device = watch()
     pose = np.array([0.05, 0.0, 0.02, 0.1, 0.0, 0.1])
@@ -92,6 +151,44 @@ def test_a_source_is_stale_by_age_and_no_claim_beats_300_ms():
     patient = CueStatus(1000 * MS, 10**15)
     assert not patient.is_stale(1300 * MS)
     assert patient.is_stale(1300 * MS + 1)
+
+
+def test_a_source_of_which_nothing_came_is_stale_at_once():
+    assert CueStatus(0, 150 * MS).is_stale(100 * MS)
+    assert CueStatus(5).is_stale(6), "no patience was told"
+
+
+def test_silence_counts_from_its_beginning_and_ends_with_a_packet():
+    source = SourceWatch()
+    for at in (100, 300, 500):
+        source.update(at * MS, None)
+    assert source.silent_for(600 * MS) == 0.5
+    source.update(700 * MS, CueStatus(700 * MS, 150 * MS))
+    assert source.silent_for(700 * MS) == 0.0
+    for at in (851, 900):
+        source.update(at * MS, None)
+    assert source.silent_for(951 * MS) == 0.1
+
+
+def test_how_long_each_silence_is_borne():
+    assert asdict(Patience()) == {
+        "valid": 0.3,
+        "feedback": 0.1,
+        "fresh": 0.5,
+        "plans": 3,
+        "hold": 2.0,
+        "pause": 600.0,
+        "silence": 30.0,
+        "raising": 20.0,
+        "lowering": 10.0,
+        "gap": 0.3,
+        "reset": 2.0,
+        "track": 0.010,
+        "track_lag": 0.15,
+        "track_time": 0.1,
+        "still": 0.3,
+        "quiver": 0.002,
+    }
 
 
 def test_a_source_drives_or_is_silent():
