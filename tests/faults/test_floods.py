@@ -108,6 +108,7 @@ def flood(
     port, platform = free_port(), free_port()
     config = {"platform": {"local_port": platform}}
     (folder / "key").write_bytes(KEY)
+    (folder / "key").chmod(0o600)
     signed = {"kind": "native", "listen": f"127.0.0.1:{port}", "key_file": str(folder / "key")}
     with FarRig(folder, config, sources=(signed,)) as rig, Client(port) as client:
         rig.engage()

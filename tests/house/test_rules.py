@@ -20,7 +20,7 @@ OURS = sorted(
     for top in ("motionserver", "protocol", "clients", "tests", "deploy")
     for path in (ROOT / top).rglob("*")
     if path.suffix in {".py", ".md", ".toml", ".js", ".css", ".html", ".h", ".c", ".cs", ".lua"}
-    and "vendor" not in path.parts
+    and not {"vendor", "corpus"} & set(path.parts)
     and "__pycache__" not in path.parts
 )
 LONGEST = 300

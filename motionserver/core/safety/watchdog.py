@@ -124,12 +124,10 @@ class DeviceWatch:
         self._machine = machine
         self._patience = patience
         self._late = max(patience.feedback, 6.0 * send_period)
-        self._valid_since: int
+        self._valid_since = self._excused_ns = self._still_since = 0
         self._astray_since: int | None = None
         self._excused: Feedback | None = None
-        self._excused_ns: int
         self._still_at: Array | None = None
-        self._still_since: int
         self.newest: Feedback | None = None
         self.error = 0.0
 
