@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from far_ends import FarRig
 from rig import PATIENCE, assert_soft, environment, free_port, prompt
 
@@ -36,6 +37,7 @@ LEASE = 1.0
 """After so long the server's Zenoh gives a frozen peer up [s]; the guard must be much quicker."""
 
 
+@pytest.mark.campaign
 def test_a_frozen_publisher_is_held_at_once_and_drives_again(tmp_path: Path) -> None:
     broker = free_port(socket.SOCK_STREAM)
     script = tmp_path / "publisher.py"

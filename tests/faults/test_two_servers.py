@@ -90,6 +90,7 @@ def drive(folder: Path, harm: Callable[[FarRig], None]) -> None:
     assert_soft(verdict)
 
 
+@pytest.mark.campaign
 def test_second_servers_leave_the_first_alone(tmp_path: Path) -> None:
     drive(tmp_path, second_servers)
 
