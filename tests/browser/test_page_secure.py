@@ -84,7 +84,9 @@ def test_another_sites_page_moves_nothing_and_reads_nothing(chromium, tmp_path):
             assert site.scene.state == "PARKED"
             audit = tmp_path / "audit.jsonl"
             lines = audit.read_text("utf-8").splitlines() if audit.exists() else []
-            assert {json.loads(line)["action"] for line in lines} <= {"refused"}
+            told = {json.loads(line)["action"] for line in lines}
+            # a source that comes is told as well; nothing here is done for a page
+            assert told <= {"refused", "client takeover"}
     finally:
         evil.shutdown()
         evil.server_close()
