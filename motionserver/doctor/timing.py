@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
 from typing import Any, Final
 
 from motionserver.doctor.finding import Finding, Level
 from motionserver.doctor.mends import LOOK_LONGER
-from motionserver.guard.loop import SLOWEST_TICK_HZ
 from motionserver.telemetry.histogram import Histogram, middle_of
+from motionserver.telemetry.ticker import ticks_per_send
 
 STALL: Final = 0.005
 """A wake-up later than this is a stall [s]."""
@@ -93,7 +92,7 @@ class Sleep:
 
 def tick_rate_of(packets_hz: float) -> float:
     """The guard's rate [Hz]: the smallest multiple of the platform's that is at least 240 Hz."""
-    return ceil((SLOWEST_TICK_HZ - 1e-6) / packets_hz) * packets_hz
+    return ticks_per_send(packets_hz) * packets_hz
 
 
 _THOUSAND: Final = 1000

@@ -27,9 +27,8 @@ from motionserver.guard.snapshot import snapshot
 from motionserver.telemetry.blackbox.guard_box import GuardBox
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.requests import RequestServer
-from motionserver.telemetry.ticker import Lateness, Ticker, now_ns
+from motionserver.telemetry.ticker import Lateness, Ticker, now_ns, ticks_per_send
 
-SLOWEST_TICK_HZ: Final = 240.0
 SNAPSHOT_NS: Final = 30_000_000
 SECOND: Final = 1_000_000_000
 
@@ -43,11 +42,8 @@ class GuardLoop:
         self, options: GuardOptions, run_dir: Path, link: socket.socket, scheduling: str
     ) -> None:
         self.options = options
-        ticks = 1
-        while ticks * options.rate_hz < SLOWEST_TICK_HZ - 1e-6:
-            ticks += 1
-        self._ticks_per_send = ticks
-        self._tick_ns = SECOND / (ticks * options.rate_hz)
+        self._ticks_per_send = ticks_per_send(options.rate_hz)
+        self._tick_ns = SECOND / (self._ticks_per_send * options.rate_hz)
         slices = slices_per_tick(self._tick_ns / SECOND)
         self.guard = Guard(replace(options.guard, slices=slices))
         self._box = GuardBox(run_dir, self.guard)

@@ -38,7 +38,7 @@ from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
-from motionserver.telemetry.ticker import Ticker, now_ns
+from motionserver.telemetry.ticker import Ticker, now_ns, ticks_per_send
 
 SECOND: Final = 1_000_000_000
 STATUS_NS: Final = 100_000_000
@@ -74,7 +74,8 @@ class PlannerLoop:
         self._box = PlannerBox(run_dir)
         self._seldom = Seldom(log)
         # a guard of short ticks needs some of them for its verdict
-        self._check_ns = int(time_of_check(options.send_period) * SECOND)
+        tick = options.send_period / ticks_per_send(1.0 / options.send_period)
+        self._check_ns = int(time_of_check(tick) * SECOND)
         self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None

@@ -12,6 +12,7 @@ import ctypes
 import os
 import time
 from collections.abc import Callable
+from math import ceil
 from typing import Final
 
 from motionserver.telemetry.histogram import Histogram
@@ -32,6 +33,15 @@ class _Timer(ctypes.Structure):
 
 _settime: Final = _libc.timerfd_settime
 _settime.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+
+
+SLOWEST_TICK_HZ: Final = 240.0
+"""A guard ticks no slower than this [Hz]."""
+
+
+def ticks_per_send(rate_hz: float) -> int:
+    """Ticks of a guard between two packets of a platform that gets ``rate_hz`` of them [Hz]."""
+    return max(1, ceil((SLOWEST_TICK_HZ - 1e-6) / rate_hz))
 
 
 class Ticker:

@@ -1,10 +1,11 @@
 """Lateness: recent percentiles, the whole run's tail, lost slots."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from motionserver.telemetry.histogram import Histogram
-from motionserver.telemetry.ticker import Lateness
+from motionserver.telemetry.ticker import Lateness, ticks_per_send
 
 MS = 1_000_000
 
@@ -42,3 +43,11 @@ def test_percentiles_never_exceed_the_largest(values):
         late.ticked(value)
     summary = late.summary()
     assert summary["late_p50_ms"] <= summary["late_p99_ms"] <= summary["late_max_ms"]
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "ticks"), [(1, 240), (60, 4), (100, 3), (120, 2), (200, 2), (240, 1), (1000, 1)]
+)
+def test_a_guard_ticks_at_the_smallest_multiple_that_is_fast_enough(rate_hz, ticks):
+    assert ticks_per_send(rate_hz) == ticks
+    assert ticks_per_send(1.0 / (1.0 / rate_hz)) == ticks
