@@ -12,7 +12,12 @@ from proposals import goals
 from motionserver.core.device import Order
 from motionserver.core.kinematics.hexapod import joint_angles
 from motionserver.core.motion.moves import rest_to_rest
+from motionserver.core.safety.act import Guard
+from motionserver.core.safety.inherit import inherit
+from motionserver.core.safety.will import WillWriter, unpack_will, will_of
 from motionserver.core.state import DriveMode
+
+SEND_NS = 16_666_667
 
 
 def bench(**config):
@@ -86,3 +91,21 @@ def stands(b, seconds=5.0):
     b.run(2.0)
     assert Order.FOLLOW not in {s.order for s in b.sent[count:]}
     legal(b) if any(s.order is Order.FOLLOW for s in b.sent) else None
+
+
+def written(b, taken_ns=0):
+    """What the guard writes with the packet it has just sent, through bytes and back."""
+    sent = len(b.sent)
+    while len(b.sent) == sent:
+        b.tick()
+    newest = b.guard.supervisor.device.newest
+    will = will_of(b.record, newest, taken_ns, b.now + SEND_NS)
+    return unpack_will(WillWriter().pack(will))
+
+
+def die(b, gap=0.0, taken_ns=0):
+    """The guard ends after a packet, another takes its place; whether it went on."""
+    will = written(b, taken_ns)
+    b.now += round(gap * 1e9)
+    b.guard = Guard(b.config)
+    return inherit(b.guard, will, b.now)

@@ -70,7 +70,7 @@ class Guard:
         record.leaving = record.leaving or given.leave
         for feedback in given.feedback:
             supervisor.device.answered(feedback)
-        supervisor.source.update(given.now_ns, given.cue)
+        supervisor.heard(given.now_ns, given.cue, given.gap)
         self._judge(given)
         answers, wishes = edges(self.config, record, supervisor, given)
         followed = supervisor.step(record, given.now_ns, given.gap, wishes)
@@ -146,7 +146,7 @@ class Guard:
         record.state, record.reason, record.since_ns = state, reason, now_ns
         record.reset_until_ns = 0
         if state is State.RAISING:
-            self._start_at(NEUTRAL, now_ns)
+            self._start_at(NEUTRAL, self.homes, now_ns)
             self._allow(self.config.patience.raising, now_ns)
         elif state is State.PARKING:
             if before not in RAISED:
@@ -162,10 +162,10 @@ class Guard:
     def _allow(self, seconds: float, now_ns: int) -> None:
         self.record.deadline_ns = now_ns + int(seconds * SECOND)
 
-    def _start_at(self, pose: Array, now_ns: int) -> None:
+    def _start_at(self, pose: Array, homes: Array, now_ns: int) -> None:
         record = self.record
         record.playback = None
-        accepted = accept_rest(self.machine, pose, record.take_id(), self.homes, REACH)
+        accepted = accept_rest(self.machine, pose, record.take_id(), homes, REACH)
         if isinstance(accepted, Rejection):
             self.supervisor.inconsistent = f"cannot stand here: {accepted}"
             record.note(now_ns, self.supervisor.inconsistent)
@@ -175,11 +175,13 @@ class Guard:
 
     def _start_from_measured(self, now_ns: int) -> None:
         newest, legs = self.supervisor.device.newest, self.supervisor.device.legs()
+        # wherever the platform stands, the way home leads over neutral: no other need be straight
+        over = self.homes[:1]
         try:
             if newest is not None and newest.pose is not None:
-                self._start_at(newest.pose, now_ns)
+                self._start_at(newest.pose, over, now_ns)
             elif legs is not None:
-                self._start_at(forward(self.machine, legs), now_ns)
+                self._start_at(forward(self.machine, legs), over, now_ns)
             else:
                 self.supervisor.inconsistent = "the device measures neither legs nor pose"
         except NoPoseError as error:

@@ -88,7 +88,9 @@ def _played(guard: Guard, will: Will) -> Playback | Rejection:
     accepted: list[AcceptedPlan] = []
     before = will.before
     for plan in will.plans:
-        verdict = accept_again(guard.machine, plan, before, guard.homes)
+        # a rest where it was measured has a straight way to neutral, perhaps to nowhere else
+        homes = guard.homes[:1] if before is None else guard.homes
+        verdict = accept_again(guard.machine, plan, before, homes)
         if isinstance(verdict, Rejection):
             return verdict
         accepted.append(verdict)

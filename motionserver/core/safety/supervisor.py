@@ -9,7 +9,7 @@ from motionserver.core.limits import Machine
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.states import CUED, Event, State, after
-from motionserver.core.safety.watchdog import SECOND, DeviceWatch, Patience, SourceWatch
+from motionserver.core.safety.watchdog import SECOND, CueStatus, DeviceWatch, Patience, SourceWatch
 from motionserver.core.state import DriveMode
 
 
@@ -35,6 +35,10 @@ class Supervisor:
         self._excused = (-1, 0)
         self.inconsistent = ""
         self.astray = False
+
+    def heard(self, now_ns: int, status: CueStatus | None, gap: float) -> None:
+        """Take what the planner knows of the source, ``gap`` [s] after the tick before."""
+        self.source.update(now_ns, status, self._gap < gap <= self.patience.gap)
 
     def step(
         self, record: GuardRecord, now_ns: int, gap: float, wishes: frozenset[Event]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -85,11 +85,24 @@ class SourceWatch:
         self.status = CueStatus()
         self._driving_since: int | None = None
         self._silent_since: int | None = None
+        # (packet, instant from which its successor is waited for anew) [ns]
+        self._excused = (0, 0)
 
-    def update(self, now_ns: int, status: CueStatus | None) -> None:
-        """Take the newest status, or none, and judge its age now."""
-        self.status = status or self.status
-        if self.status.is_stale(now_ns):
+    def update(self, now_ns: int, status: CueStatus | None, is_excused: bool = False) -> None:
+        """Take the newest status, or none, and judge its age now.
+
+        Args:
+            now_ns: Now [ns].
+            status: What the planner knows; None = nothing new.
+            is_excused: The guard itself stood still for a moment. Perhaps the whole computer did,
+                and the planner has not read yet what came: a source that was fresh before is
+                waited for anew, once.
+        """
+        before, self.status = self.status.newest_ns, status or self.status
+        newest = self.status.newest_ns
+        if is_excused and newest == before != self._excused[0] and self._silent_since is None:
+            self._excused = (newest, now_ns)
+        if not self.is_fresh(now_ns):
             self._driving_since = None
             self._silent_since = now_ns if self._silent_since is None else self._silent_since
             return
@@ -101,7 +114,11 @@ class SourceWatch:
 
     def is_fresh(self, now_ns: int) -> bool:
         """True if packets arrive, whatever they say."""
-        return not self.status.is_stale(now_ns)
+        packet, resumed = self._excused
+        status = self.status
+        if packet == status.newest_ns:
+            status = replace(status, newest_ns=resumed)
+        return not status.is_stale(now_ns)
 
     @property
     def is_paused(self) -> bool:

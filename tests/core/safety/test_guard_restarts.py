@@ -5,11 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from device_model import TICK_NS
-from guard_scenes import away, bench, legal
+from guard_scenes import away, bench, die, legal
 from own_kinematics import lengths
 
+from motionserver.core.axes import frozen
 from motionserver.core.device import Order, Phase
+from motionserver.core.safety.accept import accept_rest
+from motionserver.core.safety.act import REACH
 from motionserver.core.safety.states import RAISED, State
+from motionserver.core.safety.verdict import Reason
 
 
 @pytest.mark.parametrize(
@@ -49,6 +53,37 @@ def test_a_restart_a_hair_outside_is_drawn_inside():
     legal(b)
 
 
+FAR = (0.1975, -0.0177, 0.0, -0.0065, -0.0249, -0.0085)
+"""Straight to neutral, but through the end of the stroke on the straight way to where it parks."""
+
+
+def far_up():
+    b = bench()
+    homes = b.guard.homes
+    pose = frozen(FAR)
+    assert accept_rest(b.machine, pose, 1, homes, REACH).reason is Reason.NO_WAY_HOME
+    b.device.put_up(pose)
+    return b
+
+
+def test_a_restart_far_out_goes_home_over_neutral():
+    b = far_up()
+    b.until("PARKING", 1.0)
+    b.until("PARKED", 30.0)
+    assert "FAULT" not in b.seen
+    first = next(s for s in b.sent if s.order is Order.FOLLOW)
+    assert first.legs == pytest.approx(lengths(b.machine, np.array(FAR))[0], abs=1e-8)
+    legal(b)
+
+
+def test_a_successor_of_one_that_restarted_far_out_goes_on():
+    b = far_up()
+    b.until("PARKING", 1.0)
+    assert die(b)
+    b.until("PARKED", 30.0)
+    legal(b)
+
+
 def test_a_dry_run_moves_nothing():
     b = bench(dry_run=True)
     b.until("PARKED", 1.0)
@@ -73,6 +108,42 @@ def test_a_short_gap_of_the_loop_is_only_an_event():
     assert b.record.playback.clock - clock < 0.1
     b.run(1.0)
     assert b.state == "RUN"
+
+
+@pytest.mark.parametrize("gap", [0.15, 0.29])
+def test_what_came_in_a_short_gap_of_the_computer_may_be_read_after_it(gap):
+    b = bench().engaged()
+    b.source = False
+    b.tick()
+    b.tick(gap_ns=int(gap * 1e9))
+    for _ in range(30):
+        b.tick()
+        assert b.state == "RUN"
+    b.source = True
+    b.run(1.0)
+    assert b.seen[-1] == "RUN"
+
+
+def test_a_source_that_stays_away_after_a_gap_is_stale_in_time_and_excused_once():
+    b = bench().engaged()
+    b.source = False
+    b.run(0.1)
+    b.tick(gap_ns=90_000_000)
+    b.run(0.1)
+    assert b.state == "RUN", "190 ms of silence, of which 90 were ours"
+    b.tick(gap_ns=90_000_000)
+    assert b.state == "HOLD"
+    assert "stale" in b.record.reason
+
+
+def test_a_source_that_was_silent_before_the_gap_is_not_excused():
+    b = bench().engaged()
+    b.source = False
+    b.run(0.2)
+    assert b.state == "HOLD"
+    silent = b.guard.supervisor.source.silent_for(b.now)
+    b.tick(gap_ns=90_000_000)
+    assert b.guard.supervisor.source.silent_for(b.now) == pytest.approx(silent + 0.09)
 
 
 @pytest.mark.parametrize("gap", [0.31, 5.0])

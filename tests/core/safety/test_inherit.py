@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from guard_scenes import STATES, Bench, away, bench, in_state, legal
+from guard_scenes import STATES, Bench, away, bench, die, in_state, legal, written
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import compact
@@ -16,26 +16,6 @@ from motionserver.core.device import Order
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.inherit import LONGEST_GAP, inherit
 from motionserver.core.safety.will import WillWriter, unpack_will, will_of
-
-SEND_NS = 16_666_667
-
-
-def written(b, taken_ns=0):
-    """What the guard writes with the packet it has just sent, through bytes and back."""
-    sent = len(b.sent)
-    while len(b.sent) == sent:
-        b.tick()
-    newest = b.guard.supervisor.device.newest
-    will = will_of(b.record, newest, taken_ns, b.now + SEND_NS)
-    return unpack_will(WillWriter().pack(will))
-
-
-def die(b, gap=0.0, taken_ns=0):
-    """The guard ends after a packet, another takes its place; whether it went on."""
-    will = written(b, taken_ns)
-    b.now += round(gap * 1e9)
-    b.guard = Guard(b.config)
-    return inherit(b.guard, will, b.now)
 
 
 def follows(b, count):
