@@ -121,6 +121,7 @@ class Inputs:
         inputs: list[Input],
         may_change_owner: Callable[[], bool],
         sessions: SessionKeeper | None = None,
+        look_ns: int = 0,
     ) -> None:
         """Take opened inputs.
 
@@ -128,11 +129,12 @@ class Inputs:
             inputs: Whose packets are read.
             may_change_owner: Whether another client may move the platform now.
             sessions: Remembers sessions of sources with a key; None believes what was recorded.
+            look_ns: Time between two looks at the inputs [ns].
         """
         self.inputs = inputs
         self._sessions = sessions
-        self.vehicle = Gate(may_change_owner)
-        self.sensor = Gate()
+        self.vehicle = Gate(may_change_owner, look_ns)
+        self.sensor = Gate(look_ns=look_ns)
         self.previews = PreviewInlet()
         self.counters: Counter[str] = Counter()
         self.owner_input: Input | None = None

@@ -65,6 +65,7 @@ class PlannerLoop:
             [open_input(one) for one in options.inputs],
             lambda: self._state not in (State.RUN, State.HOLD),
             keeper_of(options, run_dir),
+            int(options.period * SECOND),
         )
         self._intake = Intake()
         self._measured = MeasuredForce()

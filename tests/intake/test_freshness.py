@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from motionserver.core.intake.freshness import MS, SECOND_NS, Freshness
 
 
-def after(*gaps_ms: float) -> tuple[Freshness, int]:
-    fresh = Freshness()
+def after(*gaps_ms: float, look: float = 0.0) -> tuple[Freshness, int]:
+    fresh = Freshness(int(look * MS))
     times = [int(t * MS) for t in accumulate((1000.0, *gaps_ms))]
     for time in times:
         fresh.arrived(time)
@@ -47,6 +47,22 @@ def test_median_interval_and_stale_rule(
     assert fresh.stale_after_ns() == stale_after * MS
     assert not fresh.is_stale(now + int(stale_after * MS))
     assert fresh.is_stale(now + int(stale_after * MS) + 1)
+
+
+@pytest.mark.parametrize(
+    ("look", "gaps", "interval"),
+    [
+        (33, [0, 33] * 5, 33),
+        (33, [0, 0, 33] * 5, 33),
+        (33, [50] * 5, 50),
+        (10, [0, 10] * 5, 10),
+        (4, [1] * 5, 5),
+        (120, [0, 120] * 3, 100),
+    ],
+)
+def test_packets_that_are_read_together_did_not_come_together(look, gaps, interval):
+    fresh, _ = after(*gaps, look=look)
+    assert fresh.interval_ns() == interval * MS
 
 
 def test_only_the_last_second_counts() -> None:

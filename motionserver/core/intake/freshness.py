@@ -14,10 +14,13 @@ class Freshness:
     """Arrival statistics of one source.
 
     Stale = newest packet older than max(50 ms, 3 T), with T the median interval over the last
-    second, clipped to 5..100 ms.
+    second, clipped to 5..100 ms, and no shorter than the time between two looks: packets that are
+    read together seem to have come together.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, look_ns: int = 0) -> None:
+        """Begin without an arrival; somebody looks every ``look_ns`` [ns]."""
+        self._shortest = max(5 * MS, look_ns)
         self._arrivals: deque[int] = deque(maxlen=1024)
 
     @property
@@ -32,12 +35,12 @@ class Freshness:
             self._arrivals.popleft()
 
     def interval_ns(self) -> int:
-        """Median interval T of the last second, clipped to 5..100 ms [ns]."""
+        """Median interval T of the last second, clipped as told above [ns]."""
         if len(self._arrivals) < 3:
             return 100 * MS
         times = list(self._arrivals)
         gaps = sorted(b - a for a, b in itertools.pairwise(times))
-        return min(max(gaps[len(gaps) // 2], 5 * MS), 100 * MS)
+        return min(max(gaps[len(gaps) // 2], self._shortest), 100 * MS)
 
     def stale_after_ns(self) -> int:
         """Age beyond which the source is stale [ns]."""

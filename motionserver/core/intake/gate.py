@@ -40,7 +40,16 @@ class Owner:
 class Gate:
     """Believe or refuse packets of one input, one owner at a time."""
 
-    def __init__(self, may_change_owner: Callable[[], bool] = lambda: True) -> None:
+    def __init__(
+        self, may_change_owner: Callable[[], bool] = lambda: True, look_ns: int = 0
+    ) -> None:
+        """Take nobody's packets yet.
+
+        Args:
+            may_change_owner: Whether another client may move the platform now.
+            look_ns: Time between two looks at the input [ns].
+        """
+        self._look_ns = look_ns
         self.mode = DriveMode.DRIVE
         self.lost = 0
         self._may_change_owner = may_change_owner
@@ -49,7 +58,7 @@ class Gate:
     def _hand_over(self, who: Owner | None) -> None:
         """Begin anew: what is known of one owner says nothing of the next."""
         self.owner = who
-        self.freshness = Freshness()
+        self.freshness = Freshness(self._look_ns)
         self.spoilage = Spoilage()
         self.plausibility = Plausibility()
         self._sequence: int | None = None

@@ -24,6 +24,11 @@ ASK_AGAIN = 2.5
 LATCHED = (State.FAULT, State.SAFE)
 
 
+def stale(world):
+    """The client sends 100 times a second: stale after max(50 ms, 3 T) [s]."""
+    return max(0.05, 3.0 * world.period)
+
+
 class Fault:
     """One fault of the list; subclasses say what happens and what must follow.
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 from client import Client
 from motion_protocol import Flags, Mode, encode_cue
 from motion_protocol.cue import CUE_LAYOUT
-from scenario import TICK, Fault
+from scenario import TICK, Fault, stale
 
 from motionserver.core.axes import GRAVITY
 
@@ -17,8 +17,6 @@ HEAD, SUM, VALUES = 40, 44, 48
 """Where a cue's checksum is, its payload begins, and the first acceleration stands."""
 KEY = bytes(range(32))
 INTERVAL = 0.01
-STALE = 0.05
-"""The client sends 100 times a second: stale after max(50 ms, 3 T) [s]."""
 
 
 def forged(packet, offset, data):
@@ -78,7 +76,7 @@ class Silence(ClientFault):
 
     def bound(self):
         # a packet is stamped when it is read, at most a period after it came
-        return STALE + self.world.period + self.world.thinking + 2 * TICK
+        return stale(self.world) + self.world.period + self.world.thinking + 2 * TICK
 
 
 class F1(Silence):
@@ -142,7 +140,11 @@ class F2(ClientFault):
         return super().reacted() if self.share < 0.1 else self.has_left_run
 
     def bound(self):
-        return super().bound() if self.stays else 1.0 + STALE + self.world.period + 2 * TICK
+        return (
+            super().bound()
+            if self.stays
+            else 1.0 + stale(self.world) + self.world.period + 2 * TICK
+        )
 
 
 class F3(ClientFault):

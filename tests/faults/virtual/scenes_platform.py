@@ -7,7 +7,7 @@ from fittings import BASE
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_wire import Fault as Bit
 from motion_clients.moog_wire import Mcw, decode_command
-from scenario import SEND, TICK, Fault
+from scenario import SEND, TICK, Fault, stale
 
 from motionserver.core.device import Order
 from motionserver.core.safety.states import State
@@ -252,6 +252,8 @@ class F31(PlatformFault):
         return super().reacted() if self.at_base else self.has_left_run
 
     def bound(self):
+        if not self.at_base:
+            return stale(self.world) + self.world.period + self.world.thinking + 2 * TICK
         return LOST + SEND + 2 * TICK
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from fittings import Slot
-from scenario import SEND, TICK, Fault
+from scenario import SEND, TICK, Fault, stale
 
 from motionserver.core.device import Order
 from motionserver.core.safety.act import REACH
@@ -315,7 +315,7 @@ class F33(Fault):
         return self.world.counters["send_errors"] > 0 if self.stays else self.has_left_run
 
     def bound(self):
-        return 0.05 + self.world.period + self.world.thinking + 2 * TICK
+        return stale(self.world) + self.world.period + self.world.thinking + 2 * TICK
 
 
 SCENES = (F17, F18, F19, F20, F22, F23, F24, F26, F27, F29, F33)
