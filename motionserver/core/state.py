@@ -69,6 +69,7 @@ class VehicleMotion:
         at_platform: True if measured on the platform by an inertial sensor.
         preview: What comes next, if the sender knows.
         driver: What the driver does, if the sender tells.
+        sim_time_ns: The simulation's own time of the values [ns]; 0 if its format has none.
     """
 
     arrival_ns: int
@@ -82,6 +83,7 @@ class VehicleMotion:
     at_platform: bool = False
     preview: Preview | None = None
     driver: Driver | None = None
+    sim_time_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ def status_packet(
     return Status(
         session=gate.owner.session,
         sequence=counters["status_sent"] & 0xFFFFFFFF,
-        sim_time_ns=0,
+        sim_time_ns=echo.sim_time_ns,
         send_time_ns=now_ns(),
         echo_sender_time_ns=echo.sender_ns,
         receive_time_ns=echo.arrival_ns,

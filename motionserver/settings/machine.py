@@ -41,8 +41,8 @@ class _Parked(_Strict):
 
 
 class _Workspace(_Strict):
-    joint_angle_deg: Annotated[float, Field(gt=0.0, le=90.0)] | None = None
-    conditioning: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    joint_angle_deg: Annotated[float, Field(strict=True, gt=0.0, le=90.0)] | None = None
+    conditioning: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = None
     passenger_acceleration: Positive | None = None
     parked: _Parked
 
@@ -51,9 +51,9 @@ class _Box(_Strict):
     surge: Positive
     sway: Positive
     heave: Positive
-    roll_deg: Annotated[float, Field(gt=0.0, lt=80.0)]
-    pitch_deg: Annotated[float, Field(gt=0.0, lt=80.0)]
-    yaw_deg: Annotated[float, Field(gt=0.0, lt=80.0)]
+    roll_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
+    pitch_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
+    yaw_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
 
 
 class _Pace(_Strict):

@@ -45,6 +45,7 @@ class NativeSource:
             at_platform=bool(cue.flags & Flags.MEASURED_AT_PLATFORM),
             preview=_preview(cue, gravity),
             driver=_driver(cue),
+            sim_time_ns=cue.sim_time_ns,
         )
 
 

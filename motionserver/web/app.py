@@ -83,7 +83,7 @@ def build_app(
         audit,
         refusals,
     )
-    _reading_routes(app, desk, board, answered)
+    _reading_routes(app, desk, board, answered, audit)
     _motion_routes(app, desk)
     app.include_router(tuning_routes(desk))
     app.include_router(side_routes(desk))
@@ -99,8 +99,10 @@ def build_app(
     return app
 
 
-def _reading_routes(app: FastAPI, desk: Desk, board: StatusBoard, answered: Counter[str]) -> None:
-    registry = registry_for(board, answered)
+def _reading_routes(
+    app: FastAPI, desk: Desk, board: StatusBoard, answered: Counter[str], audit: Audit
+) -> None:
+    registry = registry_for(board, answered, audit)
     streams = Streams(board)
 
     @app.get("/")

@@ -12,6 +12,7 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.registry import Collector
 
 from motionserver.core.axes import AXIS_NAMES
+from motionserver.web.audit import Audit
 from motionserver.web.snapshot import StatusBoard
 
 _STATES: Final = ("OFFLINE", "PARKED", "RAISING", "READY", "RUN", "HOLD", "PARKING", "FAULT",
@@ -39,11 +40,13 @@ class StatusCollector(Collector):
     Args:
         board: The status.
         answered: HTTP answers by status code.
+        audit: The log of who changed what, for what it could not write.
     """
 
-    def __init__(self, board: StatusBoard, answered: Counter[str]) -> None:
+    def __init__(self, board: StatusBoard, answered: Counter[str], audit: Audit) -> None:
         self._board = board
         self._answered = answered
+        self._audit = audit
 
     def collect(self) -> Iterator[Metric]:
         """All metrics of now; what a process did not say is left out."""
@@ -78,12 +81,15 @@ class StatusCollector(Collector):
         for status, count in sorted(self._answered.items()):
             http.add_metric([status], count)
         yield http
+        yield CounterMetricFamily(
+            "motionserver_audit_lost", "Lines that the audit log's disk refused.", self._audit.lost
+        )
 
 
-def registry_for(board: StatusBoard, answered: Counter[str]) -> CollectorRegistry:
-    """A registry that holds nothing but the status."""
+def registry_for(board: StatusBoard, answered: Counter[str], audit: Audit) -> CollectorRegistry:
+    """A registry that holds nothing but the status and what the page itself counts."""
     registry = CollectorRegistry()
-    registry.register(StatusCollector(board, answered))
+    registry.register(StatusCollector(board, answered, audit))
     return registry
 
 

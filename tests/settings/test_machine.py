@@ -56,6 +56,8 @@ def test_the_preset_is_what_it_says():
         ("joint_angle_deg = 45.0", "joint_angle_deg = 95", "workspace.joint_angle_deg", "90"),
         ("joint_angle_deg = 45.0", "joint_angle = 0.7", "workspace.joint_angle", "_deg'"),
         ("conditioning = 0.30", "conditioning = 1.0", "workspace.conditioning", "less than 1"),
+        ("joint_angle_deg = 45.0", "joint_angle_deg = true", "workspace.joint", "valid number"),
+        ("roll_deg = 17.5", "roll_deg = true", "table2.roll_deg", "valid number"),
         ("surge = 0.198", "surge = 0", "table2.surge", "greater than 0"),
         ("roll_deg = 17.5", "roll_deg = 80", "table2.roll_deg", "less than 80"),
         ("roll_deg = 17.5", "roll = 0.3", "table2.roll", "'roll_deg'"),

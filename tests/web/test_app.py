@@ -1,3 +1,4 @@
+import fcntl
 import json
 import math
 import time
@@ -391,6 +392,16 @@ def test_metrics_are_valid_and_tell_the_state(world):
     assert {"plans_rejected", "cues"} <= names
     answered = {s.labels["status"]: s.value for s in families["motionserver_http_answers"].samples}
     assert answered["404"] == 1.0
+    assert families["motionserver_audit_lost"].samples[0].value == 0.0
+
+
+def test_what_the_audit_log_could_not_keep_is_counted(world, tmp_path):
+    client = world.client()
+    with open(world.config.audit_file.with_name("audit.jsonl.lock"), "ab") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        client.post("/api/park")
+    families = {f.name: f for f in text_string_to_metric_families(client.get("/metrics").text)}
+    assert families["motionserver_audit_lost"].samples[0].value == 1.0
 
 
 def test_hostile_text_of_the_device_stays_text(world):
