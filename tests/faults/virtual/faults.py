@@ -2,14 +2,23 @@
 
 from itertools import combinations
 
+import scenes_around
 import scenes_client
+import scenes_packets
 import scenes_planner
 import scenes_platform
 import scenes_process
 
 FAULTS = {
     cls.number: cls
-    for room in (scenes_client, scenes_platform, scenes_planner, scenes_process)
+    for room in (
+        scenes_client,
+        scenes_packets,
+        scenes_platform,
+        scenes_planner,
+        scenes_process,
+        scenes_around,
+    )
     for cls in room.SCENES
 }
 REASONS = {
