@@ -17,6 +17,8 @@ from motionserver.supervisor.addresses import claim_platform, open_link, try_add
 from motionserver.supervisor.child import Child
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
 from motionserver.supervisor.rundir import clean, take
+from motionserver.supervisor.standstill import POLL as LOOK
+from motionserver.supervisor.standstill import Standstill
 from motionserver.telemetry.blackbox.room import make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
@@ -112,7 +114,8 @@ class Service:
             loop.add_signal_handler(number, self.leave)
         children = (*self.guards, self.planner, self.web, self.box)
         keepers = [asyncio.create_task(child.keep()) for child in children]
-        watchers = [asyncio.create_task(self._show()), asyncio.create_task(self._feel_pulse())]
+        works = (self._show(), self._feel_pulse(), self._replace_frozen())
+        watchers = [asyncio.create_task(work) for work in works]
         teller = asyncio.create_task(self._tell_manager())
         await self._leave.wait()
         log.info("parking")
@@ -202,6 +205,20 @@ class Service:
                 log.error("%s stands still; killed, the spare takes over", active.name)
                 active.signal(signal.SIGKILL)
             await asyncio.sleep(POLL)
+
+    async def _replace_frozen(self) -> None:
+        """Kill a planner or a page that stands still, so that it is started again."""
+        loop = asyncio.get_running_loop()
+        watched = (
+            (self.planner, self._maps.planner, Standstill()),
+            (self.web, self._maps.page, Standstill()),
+        )
+        while True:
+            for child, shown, standstill in watched:
+                if standstill.look(loop.time(), child.pid, shown.newest_sequence()):
+                    log.error("the %s stands still; killed, another is started", child.name)
+                    child.signal(signal.SIGKILL)
+            await asyncio.sleep(LOOK)
 
     async def _tell_manager(self) -> None:
         """Ready once the guard shows itself; then how it goes, and that we are alive."""

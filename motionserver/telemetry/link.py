@@ -82,6 +82,7 @@ class Maps:
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
+        page: Page to supervisor: empty messages, as a sign of life.
         trace: Planner to a recorder: `trace.Trace`, every period.
     """
 
@@ -98,4 +99,5 @@ class Maps:
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)
+        self.page = opened("page", 0)
         self.trace = opened("trace", TRACE_BYTES)

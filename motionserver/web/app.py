@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -44,6 +44,7 @@ def build_app(
     ask_guard: Ask,
     ask_planner: Ask,
     attempts: Attempts | None = None,
+    beat: Callable[[], Coroutine[None, None, None]] | None = None,
 ) -> FastAPI:
     """Put the application together; nothing is bound or started.
 
@@ -55,6 +56,7 @@ def build_app(
         ask_guard: Sends a request to the guard.
         ask_planner: Sends a request to the planner.
         attempts: Keeps who guesses tokens waiting; None = by the real clock.
+        beat: Runs beside the watching, for whoever wants to know that the loop turns.
 
     Raises:
         WebConfigError: The tokens file cannot be used.
@@ -68,9 +70,10 @@ def build_app(
 
     @asynccontextmanager
     async def watching(_: FastAPI) -> AsyncIterator[None]:
-        task = asyncio.create_task(watch.run())
+        tasks = [asyncio.create_task(work()) for work in (watch.run, beat) if work is not None]
         yield
-        task.cancel()
+        for task in tasks:
+            task.cancel()
 
     app = FastAPI(
         title="motionserver", docs_url=None, redoc_url=None, openapi_url=None, lifespan=watching

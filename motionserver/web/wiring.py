@@ -13,10 +13,12 @@ from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.requests import ask
 from motionserver.web.app import build_app
 from motionserver.web.config import WebConfig
+from motionserver.web.heart import Heart
 
 GUARD_SNAPSHOT: Final = "guard.map"
 PLANNER_SNAPSHOT: Final = "planner.map"
 SERVICE_SNAPSHOT: Final = "service.map"
+SIGN_OF_LIFE: Final = "page.map"
 GUARD_REQUESTS: Final = "guard.sock"
 PLANNER_REQUESTS: Final = "planner.sock"
 _PATIENCE: Final = 1.0
@@ -64,4 +66,5 @@ def wired_app(config: WebConfig) -> FastAPI:
         MappedSnapshot(folder / SERVICE_SNAPSHOT),
         partial(ask, folder / GUARD_REQUESTS, timeout=_PATIENCE),
         partial(ask, folder / PLANNER_REQUESTS, timeout=_PATIENCE),
+        beat=Heart(folder / SIGN_OF_LIFE).beat,
     )

@@ -1,6 +1,8 @@
 """SIGSTOP of each process in motion: one after the other here, twenty of each as a campaign."""
 
 import json
+import os
+import signal
 import sys
 import time
 import urllib.request
@@ -11,7 +13,7 @@ from typing import Any
 
 import pytest
 from far_ends import FarRig
-from process_hands import freeze, is_loaded, rounds
+from process_hands import freeze, is_loaded, replaced, rounds
 from rig import assert_soft, is_alive
 from setpoint_log import ACCELERATION, STEP, crossing, largest_step, spread, stretches
 
@@ -61,7 +63,7 @@ def stop_guard(rig: FarRig, seconds: float) -> str:
 
 
 def stop_planner(rig: FarRig, seconds: float) -> str:
-    """Its plan plays to rest; nobody replaces it, and it drives again."""
+    """Its plan plays to rest; it is not replaced so soon, and it drives again."""
     old = rig.pid("planner")
     assert old is not None
     freeze(old, seconds)
@@ -74,8 +76,7 @@ def stop_web(rig: FarRig, seconds: float) -> str:
     old = rig.pid("web")
     assert old is not None
     freeze(old, seconds)
-    with urllib.request.urlopen(f"http://127.0.0.1:{rig.page_port}/", timeout=30.0) as answer:
-        assert answer.status == 200
+    assert serve(rig) == 200
     assert rig.pid("web") == old
     return "woke"
 
@@ -132,6 +133,30 @@ def test_whoever_stands_still_for_a_moment_moves_nothing(tmp_path: Path) -> None
         verdict = rig.verdict()
     assert_soft(verdict)
     assert largest_step(tmp_path / "base.log") < STEP
+
+
+@pytest.mark.campaign
+def test_planner_and_page_that_stand_still_for_good_are_replaced(tmp_path: Path) -> None:
+    with FarRig(tmp_path, web=True) as rig:
+        rig.run()
+        rig.wait_for(lambda: rig.pid("web"), "the page")
+        rig.wait_for(lambda: serve(rig) == 200, "the page's answer")
+        old = {name: rig.pid(name) for name in ("planner", "web")}
+        for pid in old.values():
+            assert pid is not None
+            os.kill(pid, signal.SIGSTOP)
+        rig.wait_state("PARKED")
+        for name, pid in old.items():
+            assert pid is not None
+            replaced(rig, name, pid)
+        assert rig.text().count("stands still; killed, another is started") == 2
+        rig.wait_for(lambda: serve(rig) == 200, "the page's answer")
+        rig.engage()
+        rig.wait_state("RUN")
+        rig.wait_plans(10)
+        assert rig.end() == 0
+        verdict = rig.verdict()
+    assert_soft(verdict)
 
 
 @pytest.mark.campaign

@@ -41,8 +41,8 @@ class F18(Unseen):
 class F26(Unseen):
     number = 26
     title = "the page crashes or hangs"
-    detection = "the service restarts it"
-    reaction = "none"
+    detection = "its end; no sign of life for 10 s"
+    reaction = "none; the service starts another"
     recovery = "none needed"
 
     def strike(self):

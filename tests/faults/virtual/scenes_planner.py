@@ -130,10 +130,10 @@ class F16(Fault):
 
 class F21(NoPlan):
     number = 21
-    title = "planner crashes or is killed"
+    title = "planner crashes, is killed or stands still"
     detection = "no new plan for 3 periods"
     reaction = "HOLD, the accepted plan to rest, PARKING after 2 s"
-    recovery = "another planner within 2 s; later it finds PARKED"
+    recovery = "another planner once parked; for one that stands still after 10 s"
 
     def __init__(self, world, rng):
         super().__init__(world, rng)
