@@ -1,7 +1,7 @@
 """A fault as a scenario, and how one or two of them are played and judged."""
 
 import statistics
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from random import Random
 from typing import ClassVar
 
@@ -38,14 +38,12 @@ class Fault:
         stays: The platform must go on running throughout.
         returns: It must run again by itself when the fault has gone.
         from_start: It is there before the server starts.
-        open: Why the product is known to disturb the drive although it should not; noted only.
     """
 
     number = 0
     title = detection = reaction = recovery = ""
     setup: ClassVar[dict] = {}
     stays = returns = from_start = False
-    open = ""
 
     def __init__(self, world, rng):
         self.world, self.rng = world, rng
@@ -108,7 +106,6 @@ class Outcome:
     states: list
     digest: str
     seconds: float
-    notes: list = field(default_factory=list)
 
 
 class Scene:
@@ -130,7 +127,7 @@ class Scene:
         self.world = World(seed, planner_hz, algorithm, **setup)
         self.classes, self.seed, self.seconds, self.calm = faults, seed, seconds, calm
         self.problems, self._asked, self._ran_ns = [], -1e9, 0
-        self.is_hasty, self.is_brief, self.notes = False, is_brief, []
+        self.is_hasty, self.is_brief = False, is_brief
 
     def play(self):
         world = self.world
@@ -182,8 +179,7 @@ class Scene:
             if self.calm:
                 continue
             if fault.stays and len(self.faults) == 1 and self._left_run():
-                where = self.notes if fault.open else self.problems
-                where.append(f"{fault.name} disturbed the drive: {world.record.events}")
+                self.problems.append(f"{fault.name} disturbed the drive: {world.record.events}")
             if fault.returns and len(self.faults) == 1 and world.state is not State.RUN:
                 self.problems.append(f"{fault.name}: {world.state} instead of RUN again")
 
@@ -258,7 +254,6 @@ class Scene:
             [(round((at - world.began) * 1e-9, 3), s.value) for at, s in world.account.states],
             world.digest(),
             world.elapsed,
-            self.notes,
         )
 
 

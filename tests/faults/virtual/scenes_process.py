@@ -14,7 +14,6 @@ class F17(Fault):
     detection = "gap of the guard's own loop"
     reaction = "slots are skipped, the plan's clock pauses; a gap above 0.3 s: HOLD"
     recovery = "automatic"
-    open = "plans made in the gap wait too far ahead, the next are too early: a flash of HOLD"
 
     def __init__(self, world, rng):
         super().__init__(world, rng)

@@ -98,7 +98,6 @@ def test_the_account_convicts_a_jump():
 def test_a_short_gap_of_the_guard_is_only_an_event():
     outcome = Scene([FAULTS[20]], 2, SECONDS).play()
     assert outcome.problems == []
-    assert outcome.notes == []
 
 
 def test_a_hasty_reset_after_the_platform_did_not_follow():
