@@ -72,6 +72,10 @@ def test_http_engages_when_told_so():
     b = bench(engage="http")
     b.until("PARKED", 1.0)
     b.tick()
+    b.enabled = False
+    assert "the enable input is open" in b.tick("engage", by="http")[0]
+    assert b.state == "PARKED"
+    b.enabled = True
     assert b.tick("engage", by="http") == ("",)
     b.until("RUN", 3.0)
 
