@@ -98,9 +98,9 @@ class SourceWatch:
                 and the planner has not read yet what came: a source that was fresh before is
                 waited for anew, once.
         """
-        before, self.status = self.status.newest_ns, status or self.status
+        self.status = status or self.status
         newest = self.status.newest_ns
-        if is_excused and newest == before != self._excused[0] and self._silent_since is None:
+        if is_excused and newest != self._excused[0] and self._silent_since is None:
             self._excused = (newest, now_ns)
         if not self.is_fresh(now_ns):
             self._driving_since = None

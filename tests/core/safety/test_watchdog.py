@@ -170,6 +170,26 @@ def test_silence_counts_from_its_beginning_and_ends_with_a_packet():
     assert source.silent_for(951 * MS) == 0.1
 
 
+def test_what_came_just_before_a_gap_is_excused_once_and_what_was_silent_is_not():
+    source = SourceWatch()
+    source.update(1000 * MS, CueStatus(1000 * MS, 50 * MS))
+    # its arrival is told in the tick after the gap only
+    source.update(1110 * MS, CueStatus(1010 * MS, 50 * MS), is_excused=True)
+    assert source.is_fresh(1160 * MS)
+    assert not source.is_fresh(1160 * MS + 1)
+    assert source.driving_for(1110 * MS) == pytest.approx(0.11)
+    source.update(1150 * MS, None, is_excused=True)
+    assert not source.is_fresh(1160 * MS + 1), "once"
+    source.update(1170 * MS, None)
+    source.update(1180 * MS, CueStatus(1015 * MS, 50 * MS), is_excused=True)
+    assert not source.is_fresh(1180 * MS), "it was silent before"
+    source.update(1190 * MS, CueStatus(1190 * MS, 50 * MS))
+    assert source.is_fresh(1240 * MS)
+    never = SourceWatch()
+    never.update(1000 * MS, CueStatus(0, 50 * MS), is_excused=True)
+    assert not never.is_fresh(1000 * MS)
+
+
 def test_how_long_each_silence_is_borne():
     assert asdict(Patience()) == {
         "valid": 0.3,
