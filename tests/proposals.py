@@ -93,7 +93,6 @@ class Proposer:
             pose=frozen(pose),
             velocity=frozen(velocity),
             acceleration=frozen(acceleration),
-            _coefficients=[],
         )
 
     def _near(self, share):
@@ -119,7 +118,7 @@ class Proposer:
             table[pushed] += noise * size * dt**power
         tables[1][-1] = tables[2][-1] = 0.0
         columns = dict(zip(("pose", "velocity", "acceleration"), map(frozen, tables), strict=True))
-        return replace(line, times=frozen(times), **columns, _coefficients=[])
+        return replace(line, times=frozen(times), **columns)
 
     def _remainder(self, parent, takeover):
         return remainder(parent, takeover, self._number)
@@ -168,7 +167,7 @@ class Proposer:
         table = np.array(getattr(plan, field))
         axis = self.rng.integers(6)
         table[row, axis] = change(table[row, axis])
-        return replace(plan, **{field: frozen(table)}, _coefficients=[])
+        return replace(plan, **{field: frozen(table)})
 
     def _any_field(self):
         return str(self.rng.choice(["pose", "velocity", "acceleration"]))
@@ -208,7 +207,7 @@ class Proposer:
         else:
             plan = self._bridge(parent, takeover, self._near(0.3), 3.9, knots=257)
             times = np.array(plan.times)
-        return replace(plan, times=frozen(times), _coefficients=[])
+        return replace(plan, times=frozen(times))
 
     def _wrong_parent(self, parent, takeover):
         plan = self._gentle(parent, takeover)

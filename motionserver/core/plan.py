@@ -45,7 +45,8 @@ class Plan:
     pose: Array
     velocity: Array
     acceleration: Array
-    _coefficients: list[Array] = field(default_factory=list, repr=False, compare=False)
+    # of no other plan, also of none that is made from this one by replacing a table
+    _coefficients: list[Array] = field(default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def duration(self) -> float:

@@ -1,4 +1,5 @@
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -81,10 +82,27 @@ def test_after_the_end_it_rests(seed, later):
 def test_a_rest_rests():
     pose = np.arange(6) / 10
     plan = rest_at(pose, 5)
-    assert (plan.plan_id, plan.parent_id) == (5, 5)
+    assert (plan.plan_id, plan.parent_id, plan.takeover) == (5, 5, 0.0)
+    assert rest_at(pose).plan_id == 0
     assert plan.poses(np.linspace(0, 1, 9)) == pytest.approx(np.tile(pose, (9, 1)))
     with pytest.raises(ValueError, match="read-only"):
         plan.pose[0, 0] = 1.0
+
+
+def test_a_plan_made_from_one_that_was_played_plays_its_own_tables():
+    plan = rest_at(np.zeros(6))
+    plan.poses(np.array([0.0]))
+    moved = replace(plan, pose=frozen(np.ones((2, 6))))
+    assert (moved.poses(np.array([0.0, 1.0])) == 1.0).all()
+
+
+def test_a_plan_that_was_played_is_still_the_same_plan():
+    fresh = random_plan(1)
+    plan = replace(fresh)
+    unseen = repr(plan)
+    plan.poses(np.array([0.0]))
+    assert plan == fresh
+    assert repr(plan) == unseen
 
 
 @given(seeds, st.integers(1, 256))
@@ -101,7 +119,7 @@ def test_bytes_come_back(seed, count):
 def test_the_bytes_are_little_endian_in_a_fixed_order():
     data = pack(rest_at(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), 258))
     assert data[:8] == bytes([2, 1, 0, 0, 0, 0, 0, 0])
-    assert struct.unpack_from("<I", data, 24) == (2,)
+    assert struct.unpack_from("<II", data, 24) == (2, 0)
     assert struct.unpack_from("<19d", data, 32) == (0, 1, 2, 3, 4, 5, 6, *[0] * 12)
     assert struct.unpack_from("<2d", data, 32 + 152) == (0.01, 1.0)
 
@@ -126,6 +144,10 @@ def test_damaged_bytes_are_a_plan_or_an_error(seed, data):
     except ValueError:
         return
     assert back.pose.shape == (len(back.times), 6)
+
+
+def test_four_times_the_knots_of_a_plan_are_read_and_left_to_the_check():
+    assert len(unpack(pack(random_plan(1, 1024))).times) == 1024
 
 
 @pytest.mark.parametrize("count", [0, 1025, 2**32 - 1])

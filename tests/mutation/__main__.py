@@ -23,7 +23,11 @@ SAFETY = "motionserver/core/safety"
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     "motionserver/core/intake": ["tests/intake"],
-    "motionserver/core/plan.py": ["tests/core/test_plan.py"],
+    "motionserver/core/plan.py": [
+        "tests/core/test_plan.py",
+        "tests/core/safety/test_shape.py",
+        "tests/core/safety/test_verify.py",
+    ],
     "motionserver/core/motion": ["tests/core/motion"],
     f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
     f"{SAFETY}/slices.py": ["tests/core/safety/test_patient.py"],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 
 from motionserver.core.axes import Array
@@ -72,14 +74,12 @@ def untimely(plan: Plan, parent: AcceptedPlan, clock: float) -> Rejection | None
     """
     if plan.parent_id != parent.plan.plan_id or plan.plan_id == plan.parent_id:
         return Rejection(Reason.WRONG_PARENT)
+    if not isfinite(plan.takeover):
+        return Rejection(Reason.NOT_FINITE)
     earliest = max(clock, CLOSEST if parent.before is not None else 0.0)
     if not plan.takeover >= earliest:
-        if not np.isfinite(plan.takeover):
-            return Rejection(Reason.NOT_FINITE)
         return Rejection(Reason.TOO_LATE, None, None, plan.takeover, earliest)
     if plan.takeover - clock > AHEAD:
-        if not np.isfinite(plan.takeover):
-            return Rejection(Reason.NOT_FINITE)
         return Rejection(Reason.TOO_EARLY, None, None, plan.takeover, clock + AHEAD)
     return None
 
@@ -100,17 +100,13 @@ def accept_rest(
     Returns:
         The accepted plan, or why not.
     """
-    neutral = np.zeros(6)
-    allowed = straight_way(machine, pose, neutral)
-    verdict: AcceptedPlan | Rejection = Rejection(Reason.LEG_LENGTH)
-    for share in (0.0, 0.005, 0.01, 0.02, 0.05):
-        candidate = pose * (1.0 - share)
-        drawn = share * float(np.max(np.abs(allowed.legs[0] - allowed.legs[-1])))
-        if drawn > reach:
+    verdict = _checked(machine, rest_at(pose, plan_id), None, None, homes)
+    legs = straight_way(machine, pose, np.zeros(6)).legs
+    furthest = float(np.max(np.abs(legs[0] - legs[-1])))
+    for share in (0.005, 0.01, 0.02, 0.05):
+        if isinstance(verdict, AcceptedPlan) or share * furthest > reach:
             break
-        verdict = _checked(machine, rest_at(candidate, plan_id), None, None, homes)
-        if isinstance(verdict, AcceptedPlan):
-            break
+        verdict = _checked(machine, rest_at(pose * (1.0 - share), plan_id), None, None, homes)
     return verdict
 
 

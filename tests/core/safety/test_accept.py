@@ -7,8 +7,8 @@ from proposals import goals
 
 from motionserver.core.axes import frozen
 from motionserver.core.motion.moves import rest_to_rest
-from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
-from motionserver.core.safety.verdict import AcceptedPlan, Reason
+from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest, untimely
+from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 from motionserver.cueing.governor import remainder
 
 ZERO = frozen(np.zeros(6))
@@ -52,6 +52,11 @@ def test_instants_of_the_hand_over():
     assert reason(proposal(-1e-9), clock=-0.1) is Reason.TOO_LATE
     for wild in (np.nan, np.inf, -np.inf):
         assert reason(proposal(wild)) is Reason.NOT_FINITE
+
+
+@pytest.mark.parametrize("wild", [np.nan, np.inf, -np.inf])
+def test_an_instant_that_is_no_number_is_untimely_by_itself(wild):
+    assert untimely(proposal(wild), STANDING, 0.05) == Rejection(Reason.NOT_FINITE)
 
 
 def test_a_child_of_a_waiting_plan():

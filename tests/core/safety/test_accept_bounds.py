@@ -136,5 +136,7 @@ def test_nothing_of_what_is_left_is_believed_unseen():
     assert accept_again(compact(), plan, elsewhere, HOMES).reason is Reason.DISCONTINUOUS
     lopsided = replace(plan, velocity=frozen(np.zeros((3, 6))))
     assert accept_again(compact(), lopsided, STANDING.plan, HOMES).reason is Reason.MALFORMED
+    narrow = replace(plan, pose=frozen(np.zeros((2, 5))))
+    assert accept_again(compact(), narrow, STANDING.plan, HOMES).reason is Reason.MALFORMED
     far = rest_to_rest(2, 1, 0.1, ZERO, frozen([0.5, 0, 0, 0, 0, 0]), 4.0)
     assert accept_again(compact(), far, STANDING.plan, HOMES).reason is Reason.LEG_LENGTH

@@ -190,6 +190,53 @@ def test_what_came_just_before_a_gap_is_excused_once_and_what_was_silent_is_not(
     assert not never.is_fresh(1000 * MS)
 
 
+def fresh_source(until_ms=1000):
+    """A source that drives, its newest packet at ``until_ms``, stale 150 ms later."""
+    source = SourceWatch()
+    for at in range(10, until_ms + 1, 10):
+        source.update(at * MS, CueStatus(at * MS, 150 * MS))
+    return source
+
+
+def test_after_a_gap_of_our_own_a_fresh_source_is_waited_for_anew():
+    source = fresh_source()
+    source.update(1250 * MS, None, True)
+    assert source.is_fresh(1400 * MS)
+    assert not source.is_fresh(1400 * MS + 1)
+    source.update(1390 * MS, None)
+    assert source.driving_for(1390 * MS) == pytest.approx(1.38)
+    assert source.silent_for(1390 * MS) == 0.0
+
+
+def test_a_second_gap_does_not_excuse_the_same_packet_again():
+    source = fresh_source()
+    source.update(1100 * MS, None, True)
+    source.update(1200 * MS, None, True)
+    assert not source.is_fresh(1251 * MS)
+
+
+def test_the_next_packet_is_excused_as_the_one_before_was():
+    source = fresh_source()
+    source.update(1100 * MS, None, True)
+    source.update(1110 * MS, CueStatus(1110 * MS, 150 * MS))
+    source.update(1350 * MS, None, True)
+    assert source.is_fresh(1500 * MS)
+
+
+def test_a_gap_excuses_no_source_that_was_silent_before():
+    source = fresh_source()
+    source.update(1160 * MS, None)
+    source.update(1250 * MS, None, True)
+    assert not source.is_fresh(1250 * MS)
+    assert source.silent_for(1260 * MS) == 0.1
+
+
+def test_a_gap_excuses_no_source_of_which_nothing_ever_came():
+    source = SourceWatch()
+    source.update(250 * MS, None, True)
+    assert not source.is_fresh(250 * MS)
+
+
 def test_how_long_each_silence_is_borne():
     assert asdict(Patience()) == {
         "valid": 0.3,
