@@ -30,7 +30,7 @@ SUITES = {
     ],
     "motionserver/core/motion": ["tests/core/motion"],
     f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
-    f"{SAFETY}/slices.py": ["tests/core/safety/test_patient.py"],
+    f"{SAFETY}/slices.py": ["tests/core/safety/test_slices.py"],
     f"{SAFETY}/accept.py": [
         "tests/core/safety/test_accept.py",
         "tests/core/safety/test_accept_bounds.py",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import ceil
 from typing import Final
 
@@ -43,6 +44,13 @@ def may_follow(state: State, playback: Playback | None) -> Rejection | None:
     return Rejection(Reason.TOO_EARLY) if len(playback.pending) >= MOST_PENDING else None
 
 
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    plan: Plan
+    parent: AcceptedPlan
+    slices: Slices[Verdict]
+
+
 class PatientCheck:
     """Checks one proposal at a time, some slices per tick; of those that wait the newest stays.
 
@@ -55,9 +63,7 @@ class PatientCheck:
     def __init__(self, machine: Machine, homes: Array, slices: int) -> None:
         self._machine, self._homes, self._slices = machine, homes, slices
         self._waiting: Plan | None = None
-        self._parent: AcceptedPlan | None = None
-        self._plan: Plan | None = None
-        self._check: Slices[Verdict] | None = None
+        self._check: _UnderWay | None = None
 
     @property
     def is_busy(self) -> bool:
@@ -80,43 +86,36 @@ class PatientCheck:
         Returns:
             A proposal and its verdict, as of now; None while none is ready.
         """
-        if self._check is None:
-            if self._waiting is None:
-                return None
-            self._plan, self._waiting = self._waiting, None
-            refusal = may_follow(state, playback)
-            if refusal is not None or playback is None:
-                return self._plan, refusal or Rejection(Reason.NOT_CUEING)
-            self._parent = playback.newest
-            self._check = accept_in_slices(
-                self._machine,
-                self._plan,
-                playback.newest,
-                playback.newest_clock,
-                self._homes,
-                BLOCK,
-            )
+        refusal = may_follow(state, playback)
         # forgotten unless it rests: a check that raised is over
         check, self._check = self._check, None
-        verdict = self._now(check, state, playback)
+        if check is None:
+            if self._waiting is None:
+                return None
+            plan, self._waiting = self._waiting, None
+            if refusal is not None:
+                return plan, refusal
+            assert playback is not None
+            check = self._begun(plan, playback)
+        verdict = refusal or self._now(check, playback)
         if verdict is None:
             self._check = check
             return None
-        assert self._plan is not None
-        return self._plan, verdict
+        return check.plan, verdict
 
-    def _now(
-        self, check: Slices[Verdict], state: State, playback: Playback | None
-    ) -> Verdict | None:
-        refusal = may_follow(state, playback)
-        if refusal is not None or playback is None:
-            return refusal
+    def _begun(self, plan: Plan, playback: Playback) -> _UnderWay:
+        parent, clock = playback.newest, playback.newest_clock
+        slices = accept_in_slices(self._machine, plan, parent, clock, self._homes, BLOCK)
+        return _UnderWay(plan, parent, slices)
+
+    def _now(self, check: _UnderWay, playback: Playback | None) -> Verdict | None:
+        assert playback is not None
         # by itself, not by its number: a guard that parks plays plans of its own
-        if playback.newest is not self._parent:
+        if playback.newest is not check.parent:
             return Rejection(Reason.WRONG_PARENT)
         try:
             for _ in range(self._slices):
-                next(check)
+                next(check.slices)
         except StopIteration as done:
             verdict: Verdict = done.value
             if isinstance(verdict, Rejection):

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from machines import compact
 from proposals import Proposer
 
@@ -21,7 +19,7 @@ from motionserver.core.safety.patient import (
     slices_per_tick,
     time_of_check,
 )
-from motionserver.core.safety.slices import LEAST, blocks, whole
+from motionserver.core.safety.slices import whole
 from motionserver.core.safety.states import State
 from motionserver.core.safety.verdict import AcceptedPlan, Reason, Rejection
 
@@ -87,23 +85,42 @@ def test_slices_say_to_the_bit_what_the_whole_says(seed):
     assert len(seen) >= 9, seen
 
 
-@given(st.integers(0, 5000), st.integers(1, 700))
-def test_blocks_hold_every_row_once_and_none_is_tiny(count, size):
-    rows = [row for begin, end in blocks(count, size) for row in range(begin, end)]
-    assert rows == list(range(count))
-    sizes = [end - begin for begin, end in blocks(count, size)]
-    assert all(length <= size + LEAST for length in sizes)
-    assert all(length >= min(size, LEAST) for length in sizes) or count < LEAST
-
-
 def test_how_many_slices_a_tick_has_room_for():
     assert [slices_per_tick(1 / rate) for rate in (60, 240, 333, 334, 480, 1000)] == [
         *(0, 0, 0, 5, 4, 2)
     ]
     assert slices_per_tick(SHORT) == 0
     assert slices_per_tick(1e-4) == 1
+    assert slices_per_tick(np.nextafter(0.002, 0.0)) == 4, "short by rounding only"
     assert time_of_check(1 / 240) == 0.0
     assert time_of_check(0.001) == pytest.approx(0.005)
+
+
+@pytest.mark.parametrize(
+    ("duration", "samples", "ticks"),
+    [(1.0, 507, 6), (1.0395, 527, 6), (1.0415, 528, 7), (4.0, 2007, 9)],
+)
+def test_a_slice_is_512_samples_and_the_longest_check_takes_the_time_the_planner_allows(
+    duration, samples, ticks
+):
+    """From three samples before the hand-over to three after the end; fifteen are no block."""
+    assert samples == 3 + np.ceil(duration / 0.002) + 4
+    check = patient(1)
+    check.offer(rest_to_rest(2, 1, 0.1, ZERO, frozen([0.01, 0, 0, 0, 0, 0]), duration))
+    found, took = verdict_of(check, standing())
+    assert isinstance(found, AcceptedPlan)
+    assert took == ticks
+    assert took * 0.0005 <= time_of_check(0.0005)
+
+
+def test_it_is_busy_from_the_first_slice_to_the_verdict():
+    check = patient(1)
+    assert not check.is_busy
+    check.offer(proposal())
+    check.tick(State.RUN, standing())
+    assert check.is_busy
+    verdict_of(check, standing())
+    assert not check.is_busy
 
 
 def test_a_check_takes_ticks_and_fewer_with_more_slices():
