@@ -50,7 +50,7 @@ SUITES = {
         "tests/core/safety/test_verify_told.py",
     ],
     f"{SAFETY}/watchdog.py": ["tests/core/safety/test_watchdog.py"],
-    f"{SAFETY}/will.py": ["tests/core/safety/test_inherit.py"],
+    f"{SAFETY}/will.py": ["tests/core/safety/test_will.py"],
     SAFETY: ["tests/core/safety"],
 }
 """Which tests must kill the mutants of which files: those near them; the first that fits counts."""

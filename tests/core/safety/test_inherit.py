@@ -1,7 +1,6 @@
 """A guard ends at any packet; what its successor sends is what it would have sent itself."""
 
 import copy
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from motionserver.core.axes import frozen
 from motionserver.core.device import Order
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.inherit import LONGEST_GAP, inherit
-from motionserver.core.safety.will import WillWriter, unpack_will, will_of
+from motionserver.core.safety.will import WillWriter, unpack_will
 
 
 def follows(b, count):
@@ -151,18 +150,6 @@ def test_a_base_that_measures_nothing_is_believed_to_follow():
     legal(b)
 
 
-def test_a_plan_with_the_number_of_another_is_written_as_it_is():
-    b = in_state("RUN")
-    newest = b.guard.supervisor.device.newest
-    will, writer = will_of(b.record, newest, 0, b.now), WillWriter()
-    plan = will.plans[-1]
-    other = replace(plan, pose=frozen(plan.pose + 0.001))
-    assert writer.plan(plan) is writer.plan(plan)
-    writer.pack(will)
-    written_now = unpack_will(writer.pack(replace(will, plans=(*will.plans[:-1], other))))
-    assert np.array_equal(written_now.plans[-1].pose, other.pose)
-
-
 def test_plans_that_are_not_allowed_are_not_played():
     b = in_state("RUN")
     will = written(b)
@@ -214,34 +201,3 @@ def in_state_once():
     if not _KEPT:
         _KEPT.append(in_state("RUN"))
     return copy.deepcopy(_KEPT[0])
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        (b"5", "its head is 5"),
-        (b"null", "its head is None"),
-        (b"[" * 2000, "RecursionError"),
-        ({"clock": float("nan")}, "clock is nan"),
-        ({"clock": None}, "clock is None"),
-        ({"next_id": 1 << 64}, "next_id is 18446744073709551616"),
-        ({"due_ns": 1.5}, "due_ns is 1.5"),
-        ({"leaving": 1}, "leaving is 1"),
-        ({"counters": {"a": "b"}}, "counters is"),
-        ({"feedback": {"legs": [10**400] * 6}}, "too large"),
-        ({"feedback": {"legs": [float("nan")] * 6}}, "not six numbers"),
-        ({"feedback": {"legs": [1.0] * 5}}, "not six numbers"),
-        ({"feedback": {"estop": 0}}, "estop is 0"),
-    ],
-)
-def test_what_no_guard_left_is_no_will(change, told):
-    bench = Bench(compact()).engaged()
-    data = WillWriter().pack(will_of(bench.record, bench.guard.supervisor.device.newest, 0, 1))
-    size = int.from_bytes(data[:4], "little")
-    if isinstance(change, dict):
-        head = json.loads(data[4 : 4 + size])
-        more = change.get("feedback")
-        head |= change if more is None else {"feedback": head["feedback"] | more}
-        change = json.dumps(head).encode()
-    with pytest.raises(ValueError, match=f"will of a guard: .*{told}"):
-        unpack_will(len(change).to_bytes(4, "little") + change + data[4 + size :])
