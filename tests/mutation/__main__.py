@@ -35,6 +35,7 @@ SUITES = {
         "tests/core/safety/test_accept.py",
         "tests/core/safety/test_accept_bounds.py",
     ],
+    f"{SAFETY}/edges.py": ["tests/core/safety/test_edges.py"],
     f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
     f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit.py"],
     f"{SAFETY}/record.py": ["tests/core/safety/test_record.py"],
@@ -43,6 +44,7 @@ SUITES = {
         "tests/core/safety/test_states.py",
         "tests/house/test_state_diagram.py",
     ],
+    f"{SAFETY}/supervisor.py": ["tests/core/safety/test_supervisor.py"],
     f"{SAFETY}/verdict.py": ["tests/core/safety/test_verdict.py"],
     f"{SAFETY}/verify.py": [
         "tests/core/safety/test_verify.py",

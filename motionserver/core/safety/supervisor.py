@@ -77,27 +77,24 @@ class Supervisor:
             yield Event.LOOP_GAP
         yield from self._from_device(record, now_ns)
         yield from self._from_source(record, now_ns)
-        late = now_ns > record.deadline_ns
-        if record.state is State.RAISING and late:
+        if now_ns > record.deadline_ns:
+            # which of the two it was is the state's affair: see the table
             yield Event.RAISE_TIMEOUT
-        if record.state is State.PARKING and late:
             yield Event.PARK_TIMEOUT
         if record.leaving:
             yield Event.PARK
 
     def _from_device(self, record: GuardRecord, now_ns: int) -> Iterator[Event]:
-        newest = self.device.newest
-        if newest is None or self.device.is_lost(now_ns):
+        newest = self.device.current(now_ns)
+        if newest is None:
             yield Event.FEEDBACK_LOST
             if record.reset_until_ns > now_ns and is_standing(record.playback):
                 yield Event.RESET_BLIND
             return
         if newest.estop:
             yield Event.ESTOP
-        if newest.faults or newest.phase in (Phase.FAULTED, Phase.DISABLED):
-            yield Event.DEVICE_FAULT
-            return
-        if record.state in CUED and newest.phase is not Phase.UP and not self.dry_run:
+        came_down = record.state in CUED and newest.phase is not Phase.UP and not self.dry_run
+        if newest.faults or newest.phase in (Phase.FAULTED, Phase.DISABLED) or came_down:
             yield Event.DEVICE_FAULT
             return
         if newest.estop or self.device.valid_for(now_ns) < self.patience.valid:

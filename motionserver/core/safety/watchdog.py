@@ -172,6 +172,10 @@ class DeviceWatch:
             return (now_ns - self._excused_ns) / SECOND > self._late
         return self.age(now_ns) > self._late
 
+    def current(self, now_ns: int) -> Feedback | None:
+        """The newest answer; None before the first and while the device is silent for too long."""
+        return None if self.is_lost(now_ns) else self.newest
+
     def excuse(self, now_ns: int) -> None:
         """The guard itself stood still, and a base answers what it is sent: wait anew, once."""
         if self._excused is not self.newest:

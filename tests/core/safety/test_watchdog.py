@@ -25,6 +25,7 @@ def test_before_the_first_answer():
     device = watch()
     assert device.age(5) == float("inf")
     assert device.is_lost(5)
+    assert device.current(5) is None
     assert device.valid_for(5) == 0.0
     assert device.legs() is None
     device.excuse(5)
@@ -38,6 +39,8 @@ def test_lost_is_older_than_100_ms_and_six_periods(period, late_ms):
     device = watch(period)
     device.answered(answer(1000))
     assert not device.is_lost((1000 + late_ms) * MS)
+    assert device.current((1000 + late_ms) * MS) is device.newest
+    assert device.current((1000 + late_ms) * MS + 1) is None
     assert device.is_lost((1000 + late_ms) * MS + 1)
 
 
