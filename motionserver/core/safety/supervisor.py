@@ -106,7 +106,7 @@ class Supervisor:
                 yield Event.RESET_DOWN
             elif begins:
                 yield Event.RESET_UP
-        if down and (record.state is not State.PARKING or is_standing(record.playback)):
+        if down and is_standing(record.playback):
             yield Event.DEVICE_DOWN
         if begins:
             yield Event.DEVICE_UP
@@ -131,9 +131,7 @@ class Supervisor:
         held = (now_ns - record.since_ns) / SECOND
         # what follows a pause has the patience of a hold that begins when the pause ends
         waited = (now_ns - max(record.since_ns, self._paused_ns)) / SECOND
-        if record.state is State.HOLD and (
-            waited > patience.hold or (pausing and held > patience.pause)
-        ):
+        if waited > patience.hold or (pausing and held > patience.pause):
             yield Event.HOLD_EXPIRED
         if source.silent_for(now_ns) > patience.silence:
             yield Event.SOURCE_SILENT

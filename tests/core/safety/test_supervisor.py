@@ -298,6 +298,20 @@ def test_a_source_that_is_stale_holds():
     assert scene.tick() == (State.HOLD, Event.TROUBLE)
 
 
+def test_what_the_source_sent_may_be_read_after_a_gap_of_our_own_but_two_packets_are_none():
+    for ms, ns, follows in (
+        (31, 250_000, (State.HOLD, Event.TROUBLE)),
+        (31, 250_001, None),
+        (300, 0, None),
+    ):
+        scene = Scene()
+        scene.sends = False
+        scene.run(140)
+        assert scene.tick(ms, ns=ns) == follows
+    assert scene.run(150) is None
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
 def test_a_source_that_pauses_holds():
     scene = Scene()
     scene.mode = DriveMode.PAUSE
@@ -405,7 +419,7 @@ def test_a_pause_that_ends_without_a_drive_is_a_hold_from_then_on(lost):
 
 def test_a_long_pause_that_ends_in_a_drive_runs():
     scene = held(DriveMode.PAUSE)
-    scene.record.since_ns -= 500_000 * MS
+    scene.record.since_ns -= 599_800 * MS
     scene.tick()
     scene.mode = DriveMode.DRIVE
     assert scene.run(500) is None
@@ -453,11 +467,11 @@ def test_what_happened_is_told_with_its_figures():
     scene.answer["faults"] = ("bus", "drive 3")
     scene.tick()
     assert supervisor.why(Event.DEVICE_FAULT, now) == "the device reports bus, drive 3"
-    lost = supervisor.why(Event.FEEDBACK_LOST, scene.now + 123 * MS)
-    assert lost == "no feedback from the device for 123 ms"
-    supervisor.device.error = 0.0123
+    lost = supervisor.why(Event.FEEDBACK_LOST, scene.now + 1234 * MS)
+    assert lost == "no feedback from the device for 1234 ms"
+    supervisor.device.error = 0.1234
     astray = supervisor.why(Event.TRACKING_ERROR, now)
-    assert astray == "the platform does not follow: 12.3 mm off"
+    assert astray == "the platform does not follow: 123.4 mm off"
     assert supervisor.why(Event.PARK, now) == "park was asked for"
 
 
