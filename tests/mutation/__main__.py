@@ -35,6 +35,12 @@ SUITES = {
         "tests/core/safety/test_accept.py",
         "tests/core/safety/test_accept_bounds.py",
     ],
+    f"{SAFETY}/act.py": [
+        "tests/core/safety/test_act.py",
+        "tests/core/safety/test_guard_life.py",
+        "tests/core/safety/test_guard_resets.py",
+        "tests/core/safety/test_guard_restarts.py",
+    ],
     f"{SAFETY}/edges.py": ["tests/core/safety/test_edges.py"],
     f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
     f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit.py"],
