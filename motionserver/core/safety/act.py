@@ -123,7 +123,8 @@ class Guard:
             self.judged, verdict = self._patient.tick(record.state, playback) or (None, None)
         elif given.proposal is not None:
             verdict = may_follow(record.state, playback)
-            if playback is not None and verdict is None:
+            if verdict is None:
+                assert playback is not None
                 verdict = accept_proposal(
                     self.machine, given.proposal, playback.newest, playback.newest_clock, self.homes
                 )
@@ -164,7 +165,6 @@ class Guard:
 
     def _start_at(self, pose: Array, homes: Array, now_ns: int) -> None:
         record = self.record
-        record.playback = None
         accepted = accept_rest(self.machine, pose, record.take_id(), homes, REACH)
         if isinstance(accepted, Rejection):
             self.supervisor.inconsistent = f"cannot stand here: {accepted}"
@@ -174,14 +174,17 @@ class Guard:
         self.supervisor.device.forgive()
 
     def _start_from_measured(self, now_ns: int) -> None:
-        newest, legs = self.supervisor.device.newest, self.supervisor.device.legs()
+        # what was played before its fault is not where it is now, also if it cannot be told where
+        self.record.playback = None
+        newest = self.supervisor.device.newest
+        assert newest is not None
         # wherever the platform stands, the way home leads over neutral: no other need be straight
         over = self.homes[:1]
         try:
-            if newest is not None and newest.pose is not None:
+            if newest.pose is not None:
                 self._start_at(newest.pose, over, now_ns)
-            elif legs is not None:
-                self._start_at(forward(self.machine, legs), over, now_ns)
+            elif newest.legs is not None:
+                self._start_at(forward(self.machine, newest.legs), over, now_ns)
             else:
                 self.supervisor.inconsistent = "the device measures neither legs nor pose"
         except NoPoseError as error:
@@ -193,8 +196,8 @@ class Guard:
         self._before = record.playback
         self._owed, self.owes_sample = self.owes_sample, False
         if record.playback is not None and order is Order.FOLLOW and not self._owed:
-            record.playback = advance(record.playback, self.config.send_period)
-            self._go_home(now_ns)
+            ahead = advance(record.playback, self.config.send_period)
+            record.playback = self._homeward(ahead, now_ns)
         if record.playback is None:
             state = PlatformState.at_rest(NEUTRAL)
         else:
@@ -221,8 +224,9 @@ class Guard:
             return Order.RAISE
         if record.state in CUED:
             return Order.FOLLOW
-        if record.state is State.PARKING:
-            return Order.PARK if self._is_home() else Order.FOLLOW
+        if record.state is State.PARKING and record.playback is not None:
+            is_home = standing and _ends_at_neutral(record.playback)
+            return Order.PARK if is_home else Order.FOLLOW
         if record.state is State.FAULT and not standing:
             return Order.FOLLOW
         if record.state in (State.FAULT, State.SAFE) and record.reset_until_ns > now_ns:
@@ -232,24 +236,22 @@ class Guard:
             return Order.PARK
         return Order.WAIT
 
-    def _is_home(self) -> bool:
-        playback = self.record.playback
-        return playback is None or (
-            playback.is_at_rest and not np.any(playback.playing.plan.rest_pose)
-        )
-
-    def _go_home(self, now_ns: int) -> None:
-        """While parking: once at rest, begin the straight move to neutral."""
-        record, playback = self.record, self.record.playback
-        if record.state is not State.PARKING or playback is None:
-            return
-        if not playback.is_at_rest or self._is_home():
-            return
+    def _homeward(self, playback: Playback, now_ns: int) -> Playback:
+        """While parking: once at rest, followed by the straight move to neutral."""
+        record = self.record
+        if record.state is not State.PARKING or not playback.is_at_rest:
+            return playback
+        if _ends_at_neutral(playback):
+            return playback
         move = accept_move(
             self.machine, playback.playing, playback.clock, NEUTRAL, record.take_id(), self.homes
         )
         if isinstance(move, Rejection):
             self.supervisor.inconsistent = f"no way home: {move}"
             record.note(now_ns, self.supervisor.inconsistent)
-        else:
-            record.playback = follow(playback, move)
+            return playback
+        return follow(playback, move)
+
+
+def _ends_at_neutral(playback: Playback) -> bool:
+    return not np.any(playback.playing.plan.rest_pose)

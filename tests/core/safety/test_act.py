@@ -48,7 +48,7 @@ class Scene:
         self.phase, self.answer = phase, {"legs": NEUTRAL}
         self.answers = self.drives = True
 
-    def tick(self, ms=4, is_due=True, ops=(), proposal=None, ns=0):
+    def tick(self, ms=4, is_due=True, ops=(), proposal=None, ns=0, leave=False):
         self.now += ms * MS + ns
         answer = Feedback(self.now, self.phase, self.phase.name, **self.answer)
         cue = CueStatus(self.now, 150 * MS, DriveMode.DRIVE)
@@ -62,6 +62,7 @@ class Scene:
                 cue,
                 proposal,
                 tuple(Request(op, "console") for op in ops),
+                leave,
             )
         )
         assert len(answers) == len(ops)
@@ -77,6 +78,7 @@ def test_a_new_guard_sends_the_mode_word_at_neutral():
     scene = Scene()
     assert scene.guard.judged is None
     assert not scene.guard.is_checking
+    assert not Scene(slices=1).guard.is_checking
     assert not scene.guard.owes_sample
     setpoint = scene.tick()
     assert setpoint.order is Order.WAIT
@@ -90,6 +92,14 @@ def test_nothing_is_sent_where_nothing_is_due():
     assert scene.record.counters["setpoints"] == 0
     scene.tick()
     assert scene.record.counters["setpoints"] == 1
+
+
+def test_who_is_told_once_to_leave_leaves():
+    scene = Scene(State.RUN, playback=at_rest())
+    scene.tick(leave=True)
+    assert scene.record.state is State.PARKING
+    scene.tick()
+    assert scene.record.leaving
 
 
 # orders
@@ -137,6 +147,19 @@ def test_a_faulty_device_that_was_stopped_by_hand_is_told_nothing():
 def test_a_fault_before_the_first_answer_only_waits():
     scene = Scene(State.FAULT)
     scene.answers = False
+    assert scene.tick().order is Order.WAIT
+
+
+@pytest.mark.parametrize("state", [State.OFFLINE, State.PARKED, State.SAFE])
+def test_where_nothing_is_played_nothing_is_followed_whatever_is_left_over(state):
+    scene = Scene(state, Phase.DOWN, moving())
+    assert scene.tick().order is Order.WAIT
+
+
+@pytest.mark.parametrize("state", [State.OFFLINE, State.PARKED])
+def test_where_nothing_is_latched_no_reset_is_sent(state):
+    scene = Scene(state, Phase.DOWN)
+    scene.record.reset_until_ns = 10**18
     assert scene.tick().order is Order.WAIT
 
 
@@ -282,9 +305,18 @@ def test_a_network_that_refuses_for_more_than_100_ms_is_a_fault_while_raised(sta
     scene.guard.told(begin + 100 * MS, False)
     assert scene.guard.supervisor.inconsistent == ""
     scene.guard.told(begin + 100 * MS + 1, False)
+    assert scene.guard.supervisor.inconsistent != ""
+    scene.guard.told(begin + 1234 * MS, False)
     assert scene.guard.supervisor.inconsistent == (
-        "the network takes no setpoint for 100 ms: see to the way to the platform"
+        "the network takes no setpoint for 1234 ms: see to the way to the platform"
     )
+
+
+def test_a_network_that_refuses_before_anything_was_played_takes_nothing_away():
+    scene = Scene()
+    scene.guard.told(scene.now, False)
+    assert scene.record.playback is None
+    assert not scene.guard.owes_sample
 
 
 def test_one_setpoint_that_goes_out_ends_what_the_network_refused():
@@ -381,6 +413,7 @@ def test_a_proposal_that_overtakes_one_that_waits_is_counted():
     assert scene.guard.is_checking
     assert scene.guard.judged is None
     scene.tick(proposal=second)
+    scene.tick()
     assert scene.record.counters["plans_overtaken"] == 0
     scene.tick(proposal=third)
     assert scene.record.counters["plans_overtaken"] == 1
@@ -485,6 +518,28 @@ def test_where_nobody_can_stand_is_told_twice():
     assert scene.record.reason.startswith("cannot stand here: plan rejected: leg-length")
     assert scene.record.playback is None
     assert scene.record.reason in [text for _, text in scene.record.events]
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        ({"pose": frozen([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])}, "cannot stand here"),
+        ({"legs": np.full(6, 0.3)}, "no pose found"),
+        ({}, "neither legs nor pose"),
+    ],
+)
+def test_a_reset_where_it_cannot_be_told_where_the_platform_is_moves_nothing(answer, told):
+    """What was played before the fault is not gone on with, and the device does not settle."""
+    scene = Scene(State.FAULT, playback=at_rest(LIFTED))
+    scene.answer = answer
+    scene.run(400)
+    scene.record.reset_until_ns = 10**18
+    orders = [scene.tick().order for _ in range(50)]
+    assert scene.record.playback is None
+    assert scene.record.state is State.FAULT
+    assert told in scene.record.reason
+    assert any("-> PARKING" in text for _, text in scene.record.events)
+    assert set(orders) <= {Order.WAIT, Order.RESET}
 
 
 # the way home
