@@ -37,13 +37,11 @@ SUITES = {
     ],
     f"{SAFETY}/act.py": [
         "tests/core/safety/test_act.py",
-        "tests/core/safety/test_guard_life.py",
-        "tests/core/safety/test_guard_resets.py",
         "tests/core/safety/test_guard_restarts.py",
     ],
     f"{SAFETY}/edges.py": ["tests/core/safety/test_edges.py"],
     f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
-    f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit.py"],
+    f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit_rules.py"],
     f"{SAFETY}/record.py": ["tests/core/safety/test_record.py"],
     f"{SAFETY}/shape.py": ["tests/core/safety/test_shape.py", "tests/core/safety/test_verify.py"],
     f"{SAFETY}/states.py": [

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from motionserver.core.device import Phase
+from motionserver.core.device import Feedback, Phase
 from motionserver.core.kinematics.hexapod import leg_speeds
 from motionserver.core.motion.player import Playback, state_now
 from motionserver.core.safety.accept import accept_again
@@ -54,8 +54,10 @@ def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool
         why = "it had taken over itself just before"
     elif will.plans:
         found = _played(guard, will)
-        why = str(found) if isinstance(found, Rejection) else _astray(guard, will, found)
-        playback = None if why or isinstance(found, Rejection) else found
+        if isinstance(found, str):
+            why = found
+        else:
+            playback = found
     if why and not latched:
         record.note(now_ns, f"the guard before ended in {will.state}; begins anew: {why}")
         return False
@@ -68,23 +70,8 @@ def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool
     return True
 
 
-def _astray(guard: Guard, will: Will, playback: Playback) -> str:
-    """Why the raised platform cannot be where the plan's clock says; empty if it can."""
-    if will.feedback is None or will.feedback.phase is not Phase.UP:
-        return ""
-    state = state_now(playback)
-    legs, speeds = leg_speeds(guard.machine, state.pose[None], state.velocity[None])
-    measured = measured_legs(guard.machine, will.feedback)
-    if measured is None:
-        return ""
-    gap = np.abs(measured - legs[0])
-    if bool((gap <= guard.supervisor.device.allowed(speeds[0])).all()):
-        return ""
-    return f"the platform is {1e3 * gap.max():.0f} mm from its plan"
-
-
-def _played(guard: Guard, will: Will) -> Playback | Rejection:
-    """What was played and waited, each plan accepted again."""
+def _played(guard: Guard, will: Will) -> Playback | str:
+    """What was played and waited, each plan accepted again; or why it is not gone on with."""
     accepted: list[AcceptedPlan] = []
     before = will.before
     for plan in will.plans:
@@ -92,7 +79,23 @@ def _played(guard: Guard, will: Will) -> Playback | Rejection:
         homes = guard.homes[:1] if before is None else guard.homes
         verdict = accept_again(guard.machine, plan, before, homes)
         if isinstance(verdict, Rejection):
-            return verdict
+            return str(verdict)
         accepted.append(verdict)
         before = plan
-    return Playback(accepted[0], will.clock, tuple(accepted[1:]))
+    playback = Playback(accepted[0], will.clock, tuple(accepted[1:]))
+    return _astray(guard, will.feedback, playback) or playback
+
+
+def _astray(guard: Guard, feedback: Feedback | None, playback: Playback) -> str | None:
+    """Why the raised platform cannot be where the plan's clock says; None if it can."""
+    if feedback is None or feedback.phase is not Phase.UP:
+        return None
+    measured = measured_legs(guard.machine, feedback)
+    if measured is None:
+        return None
+    state = state_now(playback)
+    legs, speeds = leg_speeds(guard.machine, state.pose[None], state.velocity[None])
+    gap = np.abs(measured - legs[0])
+    if bool((gap <= guard.supervisor.device.allowed(speeds[0])).all()):
+        return None
+    return f"the platform is {1e3 * gap.max():.0f} mm from its plan"
