@@ -53,6 +53,7 @@ SUITES = {
     f"{SAFETY}/verify.py": [
         "tests/core/safety/test_verify.py",
         "tests/core/safety/test_verify_limits.py",
+        "tests/core/safety/test_verify_slices.py",
         "tests/core/safety/test_verify_told.py",
     ],
     f"{SAFETY}/watchdog.py": ["tests/core/safety/test_watchdog.py"],

@@ -223,11 +223,11 @@ def _legs(
 def _played_before(plan: Plan, parent: Plan, before: Plan | None, step: float) -> Array:
     """The three samples before the hand-over, so that a jump there is seen; fewer if unknown."""
     instants = plan.takeover + np.array([-3.0, -2.0, -1.0]) * step
-    out = np.empty((0, 6))
-    if before is not None and instants[0] < 0.0:
-        earlier = parent.takeover + instants[instants < 0.0]
-        out = before.poses(earlier[earlier >= 0.0])
-    return np.concatenate((out, parent.poses(instants[instants >= 0.0])))
+    out = parent.poses(instants[instants >= 0.0])
+    if before is None:
+        return out
+    earlier = parent.takeover + instants[instants < 0.0]
+    return np.concatenate((before.poses(earlier[earlier >= 0.0]), out))
 
 
 def check_ways_home(

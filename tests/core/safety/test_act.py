@@ -575,7 +575,7 @@ def test_a_way_home_that_is_not_allowed_is_told_and_a_fault():
     scene = Scene(State.PARKING, playback=at_rest(LIFTED))
     machine = compact()
     scene.guard.machine = replace(machine, pace=replace(machine.pace, speed=1e-4))
-    scene.tick()
+    assert scene.tick().state.pose.tolist() == LIFTED.tolist(), "it stands where it was"
     told = scene.guard.supervisor.inconsistent
     assert told.startswith("no way home: plan rejected: malformed")
     assert scene.record.events[-1] == (scene.now, told)

@@ -92,6 +92,12 @@ def test_each_plan_keeps_the_one_it_took_over_from_and_the_clock_its_time():
     assert waiting.before is RISE
 
 
+def test_a_sample_that_did_not_go_out_is_owed():
+    guard = Guard(GuardConfig(compact(), 1 / 60, 0.0125))
+    assert inherit(guard, will(), NOW, is_sent=False)
+    assert guard.owes_sample
+
+
 def test_who_was_parked_and_played_nothing_is_parked():
     left = will(state=State.PARKED, plans=(), before=None, clock=0.0)
     goes_on, guard = inherited(left)

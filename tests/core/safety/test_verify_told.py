@@ -9,7 +9,12 @@ from own_kinematics import lengths, quintic_poses
 from verify_scenes import BARE, STANDING, ZERO, hop
 
 from motionserver.core.axes import frozen
-from motionserver.core.kinematics.hexapod import joint_angles, leg_lengths
+from motionserver.core.kinematics.hexapod import (
+    conditioning,
+    joint_angles,
+    leg_lengths,
+    neutral_conditioning,
+)
 from motionserver.core.motion.moves import straight_way, straight_ways
 from motionserver.core.plan import Plan, rest_at
 from motionserver.core.safety import verify
@@ -180,6 +185,12 @@ def test_the_samples_before_reach_the_first_instant_of_a_grandparent():
         assert (found is not None) is is_seen
 
 
+def test_one_sample_of_three_may_be_the_grandparents():
+    parent = replace(STANDING, takeover=0.002)
+    child = replace(STANDING, takeover=0.004)
+    assert check({"leg_max": NEUTRAL.max() + 0.1}, child, parent, outside_at_first()) is not None
+
+
 def test_the_worst_acceleration_of_a_passenger_is_told_and_turning_is_none():
     plan = hop(np.array([0.03, 0.04, 0.02, 0.3, 0.2, 0.1]), 0.6)
     times = np.arange(-3, 304) * 0.002
@@ -283,3 +294,17 @@ def test_the_posture_on_the_way_is_judged_at_every_fourth_pose_from_both_ends():
         )
         assert found.value == pytest.approx(swing.max(), abs=1e-12)
         assert ways({"joint_angle": swing.max() + 1e-9}, rest, (home,)) is None
+
+
+def test_conditioning_that_is_worst_in_the_middle_of_the_way_is_told():
+    rest = np.array([-0.055, 0.055, -0.236, 0.314, 0.303, -0.304])
+    home = np.array([-0.159, 0.192, 0.010, -0.206, 0.219, 0.019])
+    found = conditioning(compact(), straight_way(compact(), rest, home).poses[::4])
+    worst = float(found.min())
+    assert 0 < found.argmin() < len(found) - 1
+    ratio = worst / neutral_conditioning(compact())
+    assert ways({"conditioning": ratio * (1.0 - 1e-9)}, rest, (home,)) is None
+    told = ways({"conditioning": ratio * (1.0 + 1e-9)}, rest, (home,))
+    assert (told.reason, told.leg) == (Reason.NO_WAY_HOME, None)
+    assert told.value == pytest.approx(worst, rel=1e-12)
+    assert told.allowed == pytest.approx(worst * (1.0 + 1e-9), rel=1e-12)
