@@ -37,6 +37,8 @@ SUITES = {
     ],
     f"{SAFETY}/act.py": [
         "tests/core/safety/test_act.py",
+        "tests/core/safety/test_act_enters.py",
+        "tests/core/safety/test_act_told.py",
         "tests/core/safety/test_guard_restarts.py",
     ],
     f"{SAFETY}/edges.py": ["tests/core/safety/test_edges.py"],
@@ -48,7 +50,10 @@ SUITES = {
         "tests/core/safety/test_states.py",
         "tests/house/test_state_diagram.py",
     ],
-    f"{SAFETY}/supervisor.py": ["tests/core/safety/test_supervisor.py"],
+    f"{SAFETY}/supervisor.py": [
+        "tests/core/safety/test_supervisor.py",
+        "tests/core/safety/test_supervisor_source.py",
+    ],
     f"{SAFETY}/verdict.py": ["tests/core/safety/test_verdict.py"],
     f"{SAFETY}/verify.py": [
         "tests/core/safety/test_verify.py",

@@ -1,0 +1,247 @@
+"""Source and planner, holds and pauses exactly at their instants, and what people are told."""
+
+import pytest
+from machines import compact
+from supervisor_scene import MOVING, MS, NEUTRAL, PERIOD, RESTING, Scene
+
+from motionserver.core.device import Feedback, Phase
+from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.states import Event, State
+from motionserver.core.safety.supervisor import Supervisor, is_standing
+from motionserver.core.safety.watchdog import CueStatus, Patience
+from motionserver.core.state import DriveMode
+
+
+def test_a_source_that_is_stale_holds():
+    scene = Scene()
+    scene.sends = False
+    assert scene.run(150) is None
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
+def test_what_the_source_sent_may_be_read_after_a_gap_of_our_own_but_two_packets_are_none():
+    for ms, ns, follows in (
+        (31, 250_000, (State.HOLD, Event.TROUBLE)),
+        (31, 250_001, None),
+        (300, 0, None),
+    ):
+        scene = Scene()
+        scene.sends = False
+        scene.run(140)
+        assert scene.tick(ms, ns=ns) == follows
+    assert scene.run(150) is None
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
+def test_a_source_that_pauses_holds():
+    scene = Scene()
+    scene.mode = DriveMode.PAUSE
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
+def test_a_source_that_says_goodbye_parks_while_it_is_heard():
+    scene = Scene(State.READY)
+    scene.mode = DriveMode.BYE
+    assert scene.tick() == (State.PARKING, Event.PARK)
+    scene.sends = False
+    assert scene.run(150) == (State.PARKING, Event.PARK)
+    assert scene.tick() is None
+
+
+def test_three_periods_without_a_plan_hold():
+    scene = Scene()
+    scene.plans = False
+    assert scene.tick(23, ns=437_500) is None
+    assert scene.tick(23, ns=437_500) is None
+    assert scene.tick(0, ns=1) == (State.HOLD, Event.TROUBLE)
+
+
+@pytest.mark.parametrize("state", [State.READY, State.HOLD])
+def test_half_a_second_of_driving_runs_if_there_are_plans(state):
+    scene = Scene(state)
+    scene.record.since_ns = scene.now
+    scene.mode = DriveMode.PAUSE
+    scene.tick()
+    scene.mode = DriveMode.DRIVE
+    assert scene.run(500) is None
+    assert scene.tick() == (State.RUN, Event.CUEING)
+    scene.plans = False
+    scene.run(40)
+    assert scene.tick() is None
+
+
+def test_after_a_gap_of_our_own_plans_are_waited_for_anew_once():
+    scene = Scene()
+    scene.plans = False
+    assert scene.tick(200) is None
+    assert scene.tick(40) is None
+    assert scene.tick(7) == (State.HOLD, Event.TROUBLE), "the second gap was no excuse"
+    scene.plans = True
+    scene.tick()
+    scene.plans = False
+    assert scene.tick(200) is None, "a further plan came between"
+    assert scene.run(40) is None
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
+def test_a_gap_before_the_first_plan_is_excused_as_any_other():
+    scene = Scene()
+    scene.plans, scene.record.accepted_ns = False, 0
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+    assert scene.tick(40) is None
+
+
+def test_a_plan_whose_clock_stood_still_is_waited_for_anew():
+    scene = Scene()
+    scene.plans = False
+    scene.run(60)
+    scene.supervisor.excuse_plans(scene.record.accepted_ns, scene.now)
+    assert scene.run(40) is None
+    assert scene.tick() == (State.HOLD, Event.TROUBLE)
+
+
+def held(mode=DriveMode.DRIVE):
+    """A hold that begins now."""
+    scene = Scene(State.HOLD)
+    scene.record.since_ns, scene.mode = scene.now, mode
+    return scene
+
+
+def test_a_hold_for_want_of_plans_lasts_two_seconds():
+    scene = held()
+    scene.plans = False
+    assert scene.run(2000) is None
+    assert scene.tick(0, ns=1) == (State.PARKING, Event.HOLD_EXPIRED)
+    scene.record.state = State.READY
+    assert scene.tick() is None, "only a hold expires"
+
+
+def test_a_pause_lasts_ten_minutes():
+    scene = held(DriveMode.PAUSE)
+    scene.record.since_ns -= 599_000 * MS
+    assert scene.run(1000) is None
+    assert scene.tick(0, ns=1) == (State.PARKING, Event.HOLD_EXPIRED)
+
+
+@pytest.mark.parametrize("lost", ["source", "planner"])
+def test_a_pause_that_ends_without_a_drive_is_a_hold_from_then_on(lost):
+    scene = held(DriveMode.PAUSE)
+    scene.record.since_ns -= 300_000 * MS
+    scene.run(100)
+    if lost == "source":
+        scene.sends = False
+        scene.run(150)
+    else:
+        scene.plans = False
+        scene.run(40)
+    assert scene.run(2000) is None
+    assert scene.tick() == (State.PARKING, Event.HOLD_EXPIRED)
+
+
+def test_a_long_pause_that_ends_in_a_drive_runs():
+    scene = held(DriveMode.PAUSE)
+    scene.record.since_ns -= 599_800 * MS
+    scene.tick()
+    scene.mode = DriveMode.DRIVE
+    assert scene.run(500) is None
+    assert scene.tick() == (State.RUN, Event.CUEING)
+
+
+def test_thirty_seconds_of_silence_park_where_the_platform_is_ready():
+    scene = Scene(State.READY)
+    scene.sends = False
+    scene.run(160)
+    assert scene.run(30_000) is None
+    assert scene.tick(0, ns=1) == (State.PARKING, Event.SOURCE_SILENT)
+
+
+def test_a_supervisor_that_takes_over_waits_for_answers_and_plans_anew():
+    supervisor = Supervisor(compact(), Patience(), PERIOD, PERIOD)
+    old, now = Feedback(1000 * MS, Phase.UP, "ENGAGED", NEUTRAL), 5000 * MS
+    supervisor.resume(old, 900 * MS, now)
+    record = GuardRecord(State.RUN, accepted_ns=900 * MS, deadline_ns=10**18)
+    supervisor.heard(now, CueStatus(now, 150 * MS), 0.004)
+    assert supervisor.step(record, now, 0.004, frozenset()) is None
+    assert supervisor.device.newest is old
+    later = now + 46_875_000
+    assert supervisor.step(record, later, 0.004, frozenset()) is None
+    assert supervisor.step(record, later + 1, 0.004, frozenset()) == (State.HOLD, Event.TROUBLE)
+    lost = supervisor.step(record, now + 101 * MS, 0.004, frozenset())
+    assert lost == (State.FAULT, Event.FEEDBACK_LOST)
+
+
+def test_a_supervisor_that_takes_over_without_an_answer_has_none():
+    supervisor = Supervisor(compact(), Patience(), PERIOD, PERIOD)
+    supervisor.resume(None, 0, MS)
+    assert supervisor.device.newest is None
+
+
+# what is told
+
+
+def test_what_happened_is_told_with_its_figures():
+    scene = Scene()
+    supervisor, now = scene.supervisor, scene.now
+    supervisor.inconsistent = "no way home"
+    assert supervisor.why(Event.INCONSISTENT, now) == "no way home"
+    assert supervisor.why(Event.DEVICE_FAULT, now) == "the device reports UP"
+    scene.answer["faults"] = ("bus", "drive 3")
+    scene.tick()
+    assert supervisor.why(Event.DEVICE_FAULT, now) == "the device reports bus, drive 3"
+    lost = supervisor.why(Event.FEEDBACK_LOST, scene.now + 1234 * MS)
+    assert lost == "no feedback from the device for 1234 ms"
+    supervisor.device.error = 0.1234
+    astray = supervisor.why(Event.TRACKING_ERROR, now)
+    assert astray == "the platform does not follow: 123.4 mm off"
+    assert supervisor.why(Event.PARK, now) == "park was asked for"
+
+
+def test_why_it_holds_is_told():
+    scene = Scene()
+    why, now = scene.supervisor.why, scene.now
+    assert why(Event.TROUBLE, now) == "no plan was accepted from the planner"
+    assert why(Event.TROUBLE, now + 151 * MS) == (
+        "the source is stale: nothing that can be believed comes from the simulator"
+    )
+    scene.mode = DriveMode.PAUSE
+    scene.tick()
+    assert why(Event.TROUBLE, scene.now) == "the simulator pauses"
+
+
+def test_a_device_that_never_answered_has_reported_no_fault():
+    supervisor = Supervisor(compact(), Patience(), PERIOD, PERIOD)
+    assert supervisor.why(Event.DEVICE_FAULT, 0) == "the device reports a fault"
+
+
+def test_why_engaging_is_not_possible_is_told():
+    scene = Scene(State.PARKED, Phase.DOWN)
+    refusal, record = scene.supervisor.refusal, scene.record
+    assert refusal(record, scene.now) == ""
+    assert refusal(record, scene.now + 151 * MS) == (
+        "no fresh source that can be believed: start the simulator first"
+    )
+    record.state = State.RUN
+    assert refusal(record, scene.now) == ("the state is RUN; engaging is possible in PARKED only")
+    record.leaving = True
+    assert refusal(record, scene.now) == "the service is ending"
+
+
+def test_engaging_needs_a_device_that_says_it_is_down():
+    needed = "the device does not say that it is down and ready"
+    scene = Scene(State.PARKED, Phase.STARTING)
+    assert scene.supervisor.refusal(scene.record, scene.now) == needed
+    silent = Supervisor(compact(), Patience(), PERIOD, PERIOD)
+    assert silent.refusal(GuardRecord(State.PARKED), 0) == needed
+
+
+def test_standing_is_playing_nothing_or_being_at_rest():
+    assert is_standing(None)
+    assert is_standing(RESTING)
+    assert not is_standing(MOVING)
+
+
+def test_a_supervisor_begins_without_a_complaint():
+    supervisor = Supervisor(compact(), Patience(), PERIOD, PERIOD)
+    assert supervisor.inconsistent == ""
+    assert supervisor.astray is False
+    assert not supervisor.dry_run
