@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 from fault_pairs import pairs_of
-from faults import FAULTS
+from faults import FAULTS, FORESEEN
 from scenario import Scene
 
 SECONDS = 30.0
@@ -48,8 +48,10 @@ def play(numbers, seed, **more):
         pytest.skip("already in the log")
     algorithm = "mpc" if seed % MPC_EVERY == 0 else "classical"
     outcome = Scene([FAULTS[n] for n in numbers], seed, SECONDS, 60.0, algorithm, **more).play()
-    assert outcome.problems == [], (outcome.names, seed, outcome.states)
-    assert outcome.violations == 0
+    refused = ("sent:", "received:") if numbers in FORESEEN else ()
+    problems = [text for text in outcome.problems if not text.startswith(refused)]
+    assert problems == [], (outcome.names, seed, outcome.states)
+    assert outcome.violations == 0 or refused
     if len(numbers) == 1:
         # what masks what is not asked of two: they must be soft, and end safe
         assert outcome.late == [], outcome.states
