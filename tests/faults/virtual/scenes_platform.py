@@ -6,7 +6,7 @@ import numpy as np
 from fittings import BASE
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_wire import Fault as Bit
-from motion_clients.moog_wire import Mcw, decode_command
+from motion_clients.moog_wire import MachineState, Mcw, decode_command
 from scenario import SEND, TICK, Fault, stale
 
 from motionserver.core.device import Order
@@ -27,6 +27,33 @@ class PlatformFault(Fault):
     def bound(self):
         # an answer is read a tick after it came; it is missed when the next one is due
         return LOST + SEND + 2 * TICK
+
+
+class Astray(PlatformFault):
+    """Counted from when the base is further from its command than allowed, or has faulted."""
+
+    _beyond_ns = None
+
+    def look(self):
+        world = self.world
+        if self.struck_ns is not None and world.encoded.order is Order.FOLLOW:
+            legs = world.encoded.legs - 0.9022
+            off = np.abs(legs - np.array(world.base.legs.extensions))
+            speeds = self._speeds(world.encoded.legs)
+            astray = off > PATIENCE.track + PATIENCE.track_lag * speeds
+            if astray.any() or MachineState.FAULT1 <= world.base.state <= MachineState.FAULT3:
+                self._beyond_ns = self._beyond_ns or world.now
+            elif self.reacted_ns is None:
+                self._beyond_ns = None
+        super().look()
+
+    def _speeds(self, legs):
+        last, self._last = getattr(self, "_last", (0, legs)), (self.world.now, legs)
+        elapsed = max(SEND, (self.world.now - last[0]) * 1e-9)
+        return np.abs(legs - last[1]) / elapsed
+
+    def onset_ns(self):
+        return self._beyond_ns or self.struck_ns
 
 
 class F10(PlatformFault):
@@ -129,7 +156,7 @@ class F12(Fault):
         return 2 * TICK
 
 
-class F13(PlatformFault):
+class F13(Astray):
     number = 13
     title = "platform does not follow"
     detection = "difference to the command > 10 mm + 0.15 s x leg speed for 100 ms"
@@ -140,7 +167,6 @@ class F13(PlatformFault):
         super().__init__(world, rng)
         self.seconds = 4.0
         self.leg = rng.randrange(6)
-        self._beyond_ns = None
 
     def strike(self):
         # freed, it hurries to where it should have been
@@ -153,26 +179,6 @@ class F13(PlatformFault):
     def relent(self):
         self.world.base.free_leg(self.leg)
         self.world.client.alter.pop()
-
-    def look(self):
-        world = self.world
-        if self.struck_ns is not None and world.encoded.order is Order.FOLLOW:
-            legs = world.encoded.legs - 0.9022
-            off = np.abs(legs - np.array(world.base.legs.extensions))
-            speeds = self._speeds(world.encoded.legs)
-            if (off > PATIENCE.track + PATIENCE.track_lag * speeds).any():
-                self._beyond_ns = self._beyond_ns or world.now
-            elif self.reacted_ns is None:
-                self._beyond_ns = None
-        super().look()
-
-    def _speeds(self, legs):
-        last, self._last = getattr(self, "_last", (0, legs)), (self.world.now, legs)
-        elapsed = max(SEND, (self.world.now - last[0]) * 1e-9)
-        return np.abs(legs - last[1]) / elapsed
-
-    def onset_ns(self):
-        return self._beyond_ns or self.struck_ns
 
     def bound(self):
         # what it says of itself is late by its lag and one and a half frames
@@ -257,7 +263,7 @@ class F31(PlatformFault):
         return LOST + SEND + 2 * TICK
 
 
-class F36(PlatformFault):
+class F36(Astray):
     number = 36
     title = "a second server on the same base"
     detection = "exclusive port and lock; by its effect on the base: fault, state, tracking error"
