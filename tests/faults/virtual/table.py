@@ -5,7 +5,7 @@ import statistics
 import sys
 from pathlib import Path
 
-from faults import FAULTS
+from faults import FAULTS, FORESEEN
 
 HEAD = """# What can go wrong, and what was measured
 
@@ -51,6 +51,10 @@ def markdown(outcomes):
     if two:
         violations = sum(one["violations"] for one in two)
         out += f"\n{len(two)} random pairs of faults that overlap: {violations} violations.\n"
+        for numbers, why in FORESEEN.items():
+            names = [f"F{number}" for number in numbers]
+            seen = sum(one["violations"] for one in two if one["names"] == names)
+            out += f"\n{seen} of them are foreseen, {' with '.join(names)}: {why}.\n" * bool(seen)
     return out
 
 

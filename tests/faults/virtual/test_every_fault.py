@@ -116,3 +116,10 @@ def test_the_table_tells_figures():
     text = markdown([outcome])
     assert "| F10 platform silent |" in text
     assert "| 125 ms | 100 ms | 100 ms | 1 | 0 |" in text
+
+
+def test_the_table_tells_which_violations_were_foreseen():
+    pair = {"names": ["F13", "F24"], "took": {}, "bounds": {}, "violations": 6}
+    calm = {"names": ["F1", "F2"], "took": {}, "bounds": {}, "violations": 0}
+    assert "6 of them are foreseen, F13 with F24: a leg is stuck" in markdown([pair, calm])
+    assert "foreseen" not in markdown([calm])
