@@ -10,7 +10,7 @@ from typing import Final
 from motionserver.doctor.finding import Finding, Level
 from motionserver.doctor.mends import RUN_DIR
 from motionserver.doctor.tree import Tree
-from motionserver.supervisor.rundir import LONGEST_PATH
+from motionserver.supervisor.rundir import LONGEST_PATH, MARKER, foreign_content
 
 RUN_SPACE: Final = 8 << 20
 """Free bytes for a run: a page of a mapped file that finds none kills its process."""
@@ -32,6 +32,7 @@ class Folder:
         free: Free space for this user [bytes]; None if the file system does not tell.
         kind: Kind of file system; None if it is not shown.
         mode: Permission bits; None while it does not exist.
+        foreign: Names of files in it that are not the server's, when it has no marker of ours.
     """
 
     path: Path
@@ -41,6 +42,7 @@ class Folder:
     free: int | None
     kind: str | None
     mode: int | None = None
+    foreign: tuple[str, ...] = ()
 
 
 def look_at(tree: Tree, path: Path) -> Folder:
@@ -69,7 +71,15 @@ def look_at(tree: Tree, path: Path) -> Folder:
         free,
         None if mount is None else mount.kind,
         None if state is None else state.st_mode & 0o777,
+        _foreign(path),
     )
+
+
+def _foreign(path: Path) -> tuple[str, ...]:
+    try:
+        return tuple(foreign_content(path))
+    except OSError:
+        return ()
 
 
 def run_directory(folder: Folder) -> Finding:
@@ -86,6 +96,12 @@ def run_directory(folder: Folder) -> Finding:
     bad = _unusable(name, folder, RUN_SPACE, Level.PROBLEM, move)
     if bad is not None:
         return bad
+    if folder.foreign:
+        return Finding(
+            name, Level.PROBLEM,
+            f"{folder.path} holds {', '.join(folder.foreign[:4])} and no {MARKER} of ours",
+            "the server will not start: a run would delete files there", move,
+        )  # fmt: skip
     found = _words(folder)
     if folder.kind is None:
         return Finding(

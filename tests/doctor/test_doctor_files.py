@@ -55,6 +55,11 @@ STATE = replace(RUN, path=Path("/var/lib/motionserver"), kind="ext4")
             {"path": Path("/run/" + "x" * 66)}, Level.PROBLEM,
             "/run/" + "x" * 66 + ": 71 bytes long, sockets allow 70", mends.RUN_DIR,
         ),
+        (
+            {"foreign": ("config.json", "letter.odt")}, Level.PROBLEM,
+            "/run/motionserver holds config.json, letter.odt and no .motionserver-run",
+            mends.RUN_DIR,
+        ),
         ({"path": Path("/run/" + "x" * 65)}, Level.OK, "/run/" + "x" * 65 + ": tmpfs", ""),
     ],
 )  # fmt: skip
@@ -175,3 +180,9 @@ def test_what_may_not_be_read_or_seen(judge):
 
 def test_an_enable_switch_that_can_be_read(tmp_path):
     assert enable_switch(made(tmp_path, 0o644)).level is Level.OK
+
+
+def test_run_directory_with_somebodys_files_is_seen(tmp_path):
+    (tmp_path / "letter.odt").write_text("mine")
+    assert look_at(Tree(), tmp_path).foreign == ("letter.odt",)
+    assert look_at(Tree(), tmp_path / "none").foreign == ()

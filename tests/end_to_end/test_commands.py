@@ -87,7 +87,7 @@ def test_commands_of_an_operator(tmp_path: Path, cli: Cli) -> None:
         assert rig.end() == 0
         assert rig.leftovers() == []
         left = {path.name for path in rig.run_dir.iterdir()}
-        assert left == {"guard.lock", "service.lock"}
+        assert left == {".motionserver-run", "guard.lock", "service.lock"}
         assert stat.S_IMODE(rig.run_dir.stat().st_mode) == 0o700
         gone = cli("status", config)
         assert gone.returncode == 2
@@ -147,11 +147,16 @@ def test_a_running_server_that_is_wrong_from_the_start_says_so_in_one_line(
             "Not a directory": write(
                 tmp_path / "e.toml", **{**good, "server": {"run_dir": "/etc/hostname/x"}}
             ),
+            "holds mine.txt": write(
+                tmp_path / "h.toml", **{**good, "server": {"run_dir": str(tmp_path / "somebodys")}}
+            ),
             "too long a path": write(
                 tmp_path / "f.toml", **{**good, "server": {"run_dir": str(tmp_path / ("x" * 90))}}
             ),
         }
         (tmp_path / "broken.toml").write_text("[platform\n", "utf-8")
+        (tmp_path / "somebodys").mkdir()
+        (tmp_path / "somebodys" / "mine.txt").write_text("mine", "utf-8")
         for words, path in cases.items():
             ended = cli("run", path)
             assert (ended.returncode, ended.stdout) == (2, ""), words

@@ -25,6 +25,8 @@ from motionserver.telemetry.trace import Trace
 FORMAT: Final = "motionserver blackbox 1"
 SUFFIX: Final = ".json.gz"
 _PART: Final = ".part"
+_NAME: Final = re.compile(r"\d{8}T\d{6}\.\d{3}Z-[a-z0-9-]*\.json\.gz(\.part)?")
+"""Name of a dump, or of the part of one; nothing else in its folder is ever deleted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +150,7 @@ def write_dump(folder: Path, data: dict[str, Any], slug: str, utc: datetime, kep
         OSError: It cannot be written; nothing of it is left.
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    for part in folder.glob(f"*{_PART}"):
+    for part in _named(folder, _PART):
         part.unlink(missing_ok=True)
     path = folder / f"{utc:%Y%m%dT%H%M%S}.{utc.microsecond // 1000:03d}Z-{slug}{SUFFIX}"
     part = path.with_name(path.name + _PART)
@@ -176,7 +178,11 @@ def write_dump(folder: Path, data: dict[str, Any], slug: str, utc: datetime, kep
 
 def dumps(folder: Path) -> list[Path]:
     """All dumps, oldest first."""
-    return sorted(folder.glob(f"*Z-*{SUFFIX}"))
+    return _named(folder, SUFFIX)
+
+
+def _named(folder: Path, ending: str) -> list[Path]:
+    return sorted(path for path in folder.glob(f"*{ending}") if _NAME.fullmatch(path.name))
 
 
 def slug_of(text: str) -> str:
