@@ -13,6 +13,8 @@ from pydantic.fields import FieldInfo
 
 from motionserver.errors import MotionServerError
 
+Range = tuple[float, float]
+"""Least and largest value."""
 BUILT_IN_ALGORITHMS: Final = ("mpc", "thondel2014", "classical")
 
 
@@ -114,12 +116,12 @@ def shown(value: object) -> object:
     return ascii(value)[:80] if not isinstance(value, int) else "a huge integer"
 
 
-def bounds(item: FieldInfo, limit: float | None) -> tuple[float, float, tuple[object, ...]]:
+def bounds(item: FieldInfo, limit: Range | None) -> tuple[float, float, tuple[object, ...]]:
     """Least and largest value of a number (0, 0 for a word), and the choices of a word.
 
     Args:
         item: Declared by `number` or `choice`.
-        limit: Largest value the machine allows, if it has a say.
+        limit: Range that the machine gives, if it has a say.
     """
     if item.annotation is str:
         return 0.0, 0.0, algorithms()
@@ -129,10 +131,10 @@ def bounds(item: FieldInfo, limit: float | None) -> tuple[float, float, tuple[ob
         return 0.0, 0.0, get_args(item.annotation)
     low = next(float(m.ge) for m in item.metadata if hasattr(m, "ge"))
     high = next(float(m.le) for m in item.metadata if hasattr(m, "le"))
-    return low, high if limit is None else min(high, limit), ()
+    return (low, high, ()) if limit is None else (*limit, ())
 
 
-def allowed_range(item: FieldInfo, limit: float | None) -> str:
+def allowed_range(item: FieldInfo, limit: Range | None) -> str:
     """What a tunable may be, in words."""
     low, high, choices = bounds(item, limit)
     if choices:
@@ -140,7 +142,7 @@ def allowed_range(item: FieldInfo, limit: float | None) -> str:
     return f"{low:g} to {high:g} {_extra(item)['unit']}".rstrip()
 
 
-def described(name: str, item: FieldInfo, limits: dict[str, float]) -> dict[str, object]:
+def described(name: str, item: FieldInfo, limits: dict[str, Range]) -> dict[str, object]:
     """One tunable for a page: name, default, meaning, unit, group, label, more, and its range."""
     low, high, choices = bounds(item, limits.get(name))
     limited: dict[str, object] = (

@@ -14,6 +14,7 @@ from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
 from motionserver.settings.fields import (
     FieldError,
+    Range,
     TuningError,
     allowed_range,
     described,
@@ -32,6 +33,10 @@ _SI_NAMES: Final = {
     "horizon_s": "horizon",
     "mpc_trust_s": "mpc_trust",
 }
+_LEAST_BOX: Final = {"m": 0.005, "deg": 0.5}
+"""Least half width of the box on machines that have much more than that."""
+_LEAST_SHARE: Final = 0.1
+"""The same on small machines, as a share of the machine's own box."""
 _ROUNDING: Final = 1e-9
 """Slack of a box against the machine's, for degrees that came from radians."""
 
@@ -68,32 +73,39 @@ class TuningModel(TuningFields):
         return _validated(values)
 
     def check_machine(self, machine: Machine) -> None:
-        """Make sure that no tunable asks for more than the machine has.
+        """Make sure that the tuned box lies inside the machine's, and is not next to nothing.
 
         Raises:
-            TuningError: The box is larger than the machine's.
+            TuningError: The box is larger than the machine's, or too small to move in.
         """
         limits = machine_limits(machine)
-        errors = [
-            FieldError(
-                name,
-                getattr(self, name),
-                _allowed(name, limits),
-                f"more than the {limit:.6g} {name.rsplit('_', 1)[1]} of machine {machine.name}",
+        errors = []
+        for name, (low, high) in limits.items():
+            value, unit = getattr(self, name), name.rsplit("_", 1)[1]
+            if low - _ROUNDING <= value <= high + _ROUNDING:
+                continue
+            what = (
+                f"more than the {high:.6g} {unit} of machine {machine.name}"
+                if value > high
+                else f"less than machine {machine.name} can be confined to"
             )
-            for name, limit in limits.items()
-            if getattr(self, name) > limit + _ROUNDING
-        ]
+            errors.append(FieldError(name, value, _allowed(name, limits), what))
         if errors:
             raise TuningError(errors)
 
 
-def machine_limits(machine: Machine) -> dict[str, float]:
-    """Largest values that a machine adds to the bounds of the model, in its units."""
-    return {
-        name: round(value / _UNITS[name.rsplit("_", 1)[1]], 9)
-        for name, value in zip(BOX_FIELDS, machine.box.tolist(), strict=True)
-    }
+def machine_limits(machine: Machine) -> dict[str, Range]:
+    """Ranges of the box on a machine, in the units of the model.
+
+    The file of the machine alone says how large its box is; bounds of the model would refuse
+    machines that are smaller or larger than its author thought of.
+    """
+    limits = {}
+    for name, value in zip(BOX_FIELDS, machine.box.tolist(), strict=True):
+        unit = name.rsplit("_", 1)[1]
+        high = round(value / _UNITS[unit], 9)
+        limits[name] = (min(_LEAST_BOX[unit], _LEAST_SHARE * high), high)
+    return limits
 
 
 def apply_changes(model: TuningModel, changes: dict[str, object]) -> TuningModel:
@@ -128,10 +140,10 @@ def describe(machine: Machine | None) -> list[dict[str, object]]:
 
 def default_for(machine: Machine) -> TuningModel:
     """The tuning of a fresh installation on this machine: its whole box, all else default."""
-    limits = machine_limits(machine)
-    defaults = {n: TuningModel.model_fields[n].default for n in BOX_FIELDS}
-    return apply_changes(TuningModel(), {n: min(limits[n], defaults[n]) for n in BOX_FIELDS})
+    return apply_changes(
+        TuningModel(), {n: high for n, (_, high) in machine_limits(machine).items()}
+    )
 
 
-def _allowed(name: str, limits: dict[str, float]) -> str:
+def _allowed(name: str, limits: dict[str, Range]) -> str:
     return allowed_range(TuningModel.model_fields[name], limits.get(name))

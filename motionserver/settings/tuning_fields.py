@@ -16,11 +16,16 @@ def _known(name: str) -> str:
     return name
 
 
-def _box(axis: str, default: float, high: float, unit: str) -> Any:  # noqa: ANN401  (pydantic's Field)
+_WIDEST: Final = {"m": 1e4, "deg": 90.0}
+"""Wider than any box a machine's file may state: the machine in use bounds the tunable box."""
+_NARROWEST: Final = 1e-6
+
+
+def _box(axis: str, default: float, unit: str) -> Any:  # noqa: ANN401  (pydantic's Field)
     return number(
         default,
-        0.005 if unit == "m" else 0.5,
-        high,
+        _NARROWEST,
+        _WIDEST[unit],
         unit,
         group="Workspace",
         label=axis.capitalize(),
@@ -89,12 +94,12 @@ class TuningFields(BaseModel):
         meaning="Translational acceleration that goes unnoticed; washing out stays below it.",
         more="faster return to neutral, false cues may be felt",
     )
-    box_surge_m: float = _box("surge", 0.198, 2.0, "m")
-    box_sway_m: float = _box("sway", 0.220, 2.0, "m")
-    box_heave_m: float = _box("heave", 0.200, 2.0, "m")
-    box_roll_deg: float = _box("roll", 17.5, 45.0, "deg")
-    box_pitch_deg: float = _box("pitch", 16.3, 45.0, "deg")
-    box_yaw_deg: float = _box("yaw", 17.5, 45.0, "deg")
+    box_surge_m: float = _box("surge", 0.198, "m")
+    box_sway_m: float = _box("sway", 0.220, "m")
+    box_heave_m: float = _box("heave", 0.200, "m")
+    box_roll_deg: float = _box("roll", 17.5, "deg")
+    box_pitch_deg: float = _box("pitch", 16.3, "deg")
+    box_yaw_deg: float = _box("yaw", 17.5, "deg")
     halving: Literal["off", "paper", "sound"] = choice(
         _START.halving, group="Workspace", label="Interval halving",
         meaning="How position limits shrink until the legs agree: off, as printed in the paper, "
