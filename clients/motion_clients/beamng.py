@@ -1,11 +1,11 @@
 """BeamNG's MotionSim packet, written from a recording: 88 bytes, magic BNG1.
 
-The game's vehicle axes are x left, y backward, z up, so ISO ax = -accY, ay = accX, az = accZ
-(gravity not included). Its world is taken as those axes at heading zero. The signs of the
-angles are those that third parties found against the game: rollPos and rollVel positive with the
-left side up, pitchPos and pitchVel positive nose UP, yawPos and yawVel positive to the RIGHT;
-no second source confirms them. The packet has neither time nor counter; angular accelerations
-are differences of rates, as in the game.
+Packets captured from the game prove its axes: acceleration in X right, Y forward, Z up, gravity
+not included, so (accX, accY, accZ) = (-ay, ax, az) of ISO 8855; at heading zero the vehicle points
+along the world's Y. rollPos is positive with the right side down (the left side up), pitchPos and
+pitchVel are positive nose UP, yawPos and yawVel positive to the RIGHT. The sign of rollVel is not
+proven; it is taken to follow rollPos. The packet has neither time nor counter; angular
+accelerations are differences of rates, as in the game.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class MotionSimEncoder:
             MAGIC,
             *self._position,
             *velocity,
-            *(ay, -ax, az),
+            *(-ay, ax, az),
             *up,
             *(roll, -pitch, -yaw),
             *(p, -q, -r),
@@ -74,4 +74,5 @@ class MotionSimEncoder:
 
 
 def _to_world(x: float, y: float, z: float) -> tuple[float, float, float]:
-    return y, -x, z
+    # x forward and y left at heading zero; the game's world has X right and Y forward there
+    return -y, x, z

@@ -14,7 +14,7 @@ from motionserver.planner.crowd import Crowd
 from motionserver.planner.options import InputOptions
 from motionserver.planner.preview import PreviewInlet
 from motionserver.planner.session_file import SessionKeeper
-from motionserver.sources.base import SourceError, SourceFormat
+from motionserver.sources.base import OtherStreamError, SourceError, SourceFormat
 from motionserver.sources.registry import make_source
 from motionserver.sources.sizes import sizes_of
 from motionserver.sources.udp import UdpInput
@@ -208,6 +208,8 @@ class Inputs:
         self.counters["packets"] += 1
         try:
             return source.decode(data, address, arrival_ns)
+        except OtherStreamError as error:
+            self._ignored(error, f"{source.name} from {address}: {error}")
         except SourceError as error:
             self._refused(error.reason, f"{source.name} from {address}: {error}")
             if error.reason not in DAMAGED:
@@ -250,6 +252,16 @@ class Inputs:
         self.last_error = text
         if self.counters[key] <= SHOWN_ERRORS:
             log.warning("packet refused, %s", text)
+
+    def _ignored(self, error: OtherStreamError, text: str) -> None:
+        """Count a packet of another stream; it says nothing against its sender."""
+        key = f"ignored_{error.reason}"
+        self.counters[key] += 1
+        if self.counters[key] == 1:
+            log.info("%s", text)
+        if self.vehicle.owner is None:
+            # nothing else may come: then this is the answer to why nothing moves
+            self.last_error = text
 
     @property
     def owner_key(self) -> bytes | None:

@@ -20,8 +20,19 @@ class SourceError(MotionServerError):
         self.reason = reason
 
 
+class OtherStreamError(SourceError):
+    """A datagram of another known stream that shares the port and carries no motion.
+
+    It is ignored under a counter of its own: nothing is wrong with it, nor with its sender.
+    """
+
+
 class SourceFormat(Protocol):
-    """One simulator's packets."""
+    """One simulator's packets.
+
+    Axes, signs and gravity of a format are proven by the physics of at least one packet captured
+    from its simulator; an encoder of our own would only mirror what the decoder assumes.
+    """
 
     name: str
 

@@ -11,21 +11,26 @@ import numpy as np
 from motionserver.core.axes import frozen
 from motionserver.core.kinematics.rotation import gravity_in_body
 from motionserver.core.state import DriveMode, VehicleMotion
-from motionserver.sources.base import SourceError
+from motionserver.sources.base import OtherStreamError, SourceError
 
 _PACKET: Final = struct.Struct("<4s21f")
 FASTEST: Final = 150.0
 """A position that moves faster than this was a respawn [m/s]."""
+OUTGAUGE_SIZES: Final = (92, 96)
+"""Length of an OutGauge packet without and with its optional number [bytes]."""
 STEP: Final = 3.0
 """And so was a step of this size beyond it [m]."""
 
 
 class BeamNgSource:
-    """Vehicle axes X left, Y back, Z up; acceleration without gravity.
+    """Acceleration in X right, Y forward, Z up, without gravity: a = (accY, -accX, accZ).
 
-    Forward is -Y and left is +X: a = (-accY, accX, accZ). The game's roll angle and rate are ours;
-    its pitch and yaw have the other sign. The format knows neither time nor pause nor respawn, so
-    silence is the pause, and a jump of position is the respawn.
+    Packets captured from the game prove it (`tests/sources/test_beamng_genuine.py`), and with it
+    the angles: roll is ours, pitch and yaw have the other sign. The format has neither time nor
+    pause nor respawn, so silence is the pause, and a jump of position is the respawn.
+
+    Many players send the game's OutGauge stream (speed, pedals, lights) to the same port. It
+    carries no motion and is ignored.
     """
 
     name = "beamng"
@@ -36,6 +41,12 @@ class BeamNgSource:
     def decode(self, data: bytes, arrival_ns: int) -> VehicleMotion:
         """Read one MotionSim packet (the extended BNG2 by its first 88 bytes)."""
         magic = data[:4]
+        if len(data) in OUTGAUGE_SIZES and magic not in (b"BNG1", b"BNG2"):
+            raise OtherStreamError(
+                "outgauge",
+                f"beamng: OutGauge packet of {len(data)} bytes, which carries no motion: "
+                f"ignored. Switch MotionSim on in the game's options, on this port",
+            )
         if magic not in (b"BNG1", b"BNG2"):
             raise SourceError("magic", f"beamng: magic {magic!r}, expected b'BNG1'")
         if len(data) < _PACKET.size or (magic == b"BNG1" and len(data) != _PACKET.size):
@@ -47,7 +58,7 @@ class BeamNgSource:
         roll, pitch = values[12], -values[13]
         roll_rate, pitch_rate, yaw_rate = values[15], -values[16], -values[17]
         jumped = self._jumped(arrival_ns, tuple(position))
-        force = np.array([-acceleration[1], acceleration[0], acceleration[2]])
+        force = np.array([acceleration[1], -acceleration[0], acceleration[2]])
         return VehicleMotion(
             arrival_ns=arrival_ns,
             session=0,

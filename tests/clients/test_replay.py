@@ -140,7 +140,7 @@ def test_beamng_replay_inverts_the_axis_map(drive, listener):
     for k, packet in enumerate(packets):
         assert packet[0] == b"BNG1"
         acc_x, acc_y, acc_z = packet[7:10]
-        assert (-acc_y, acc_x, acc_z) == (k, 0.5, -0.5)
+        assert (acc_y, -acc_x, acc_z) == (k, 0.5, -0.5)
         assert packet[16:19] == (0.25, -0.125, 0.25)
 
 
@@ -150,8 +150,8 @@ def test_beamng_packet_by_hand():
     words = packet.hex(" ", 4).replace("00000080", "00000000")  # minus zero is zero
     assert words == (
         "424e4731 00000000 00000000 00000000"  # BNG1, position 0 0 0
-        " 00000000 000080c0 00000000"  # velocity: 4 m/s towards -Y, forward at heading zero
-        " 00000040 000080bf 00004040"  # acceleration: left 2, back -1, up 3
+        " 00000000 00008040 00000000"  # velocity: 4 m/s towards +Y, forward at heading zero
+        " 000000c0 0000803f 00004040"  # acceleration: right -2, forward 1, up 3
         " 00000000 00000000 0000803f"  # up
         " 00000000 00000000 00000000"  # roll, pitch, yaw
         " 0000003f 000080be 000000be"  # rates: p, -q, -r
@@ -166,7 +166,7 @@ def test_beamng_dead_reckoning_turns_left_and_starts_anew():
         for k in range(101)
     ]
     last = [struct.unpack("<4s21f", encoder.encode(sample)) for sample in samples][-1]
-    assert last[4:7] == pytest.approx((10.0, 0.0, 0.0), abs=1e-4)  # to the left: +X
+    assert last[4:7] == pytest.approx((-10.0, 0.0, 0.0), abs=1e-4)  # to the left: -X
     assert last[15] == pytest.approx(-math.pi / 2, abs=1e-5)
     again = struct.unpack("<4s21f", encoder.encode(samples[0]))
     assert again[1:4] == (0.0, 0.0, 0.0)

@@ -41,10 +41,10 @@ for sequence in range(100000):
 
 
 def motionsim(t: float) -> bytes:
-    """88 bytes by hand: x left, y back, z up; a car that surges forward and back."""
+    """88 bytes by hand: x right, y forward, z up; a car that surges forward and back."""
     surge = 2.0 * math.sin(2.0 * t)
-    position, velocity = (0.0, -10.0 * t, 0.0), (0.0, -10.0, 0.0)
-    acceleration, up = (0.0, -surge, 0.0), (0.0, 0.0, 1.0)
+    position, velocity = (0.0, 10.0 * t, 0.0), (0.0, 10.0, 0.0)
+    acceleration, up = (0.0, surge, 0.0), (0.0, 0.0, 1.0)
     angles, rates, angular = (0.0,) * 3, (0.0,) * 3, (0.0,) * 3
     packet = struct.pack(
         "<4s21f", b"BNG1", *position, *velocity, *acceleration, *up, *angles, *rates, *angular

@@ -27,14 +27,17 @@ def beamng(data):
         motion = source.decode(data, NOW)
     except SourceError as error:
         must(not right, f"refused without need: {error}")
-        wanted = "magic" if not known else "size" if not long else "not_finite"
+        other = not known and len(data) in (92, 96)
+        wanted = (
+            "outgauge" if other else "magic" if not known else "size" if not long else "not_finite"
+        )
         same(error.reason, wanted, "reason")
         words(error, "beamng")
         return False
     assert right, "taken in spite of its form"
     is_number(motion.force, motion.rates, motion.speed)
     acc_x, acc_y, acc_z = values[6:9]
-    close(motion.force, (-acc_y, acc_x, acc_z), gravity_of(values[12], -values[13]))
+    close(motion.force, (acc_y, -acc_x, acc_z), gravity_of(values[12], -values[13]))
     same(tuple(motion.rates), (values[15], -values[16], -values[17]), "rates")
     same(int(motion.mode), 0, "mode of a first packet")
     same(int(source.decode(data, NOW + 10_000_000).mode), 0, "mode of the same place again")

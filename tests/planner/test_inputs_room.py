@@ -212,6 +212,22 @@ def test_what_a_wire_damages_is_not_the_owners_fault(key: bytes | None) -> None:
     assert inputs.counters["refused_size"] == 50
 
 
+@pytest.mark.parametrize("size", [92, 96])
+def test_outgauge_on_the_games_port_is_ignored_and_counted(size: int) -> None:
+    inputs, wire = room("beamng")
+    wire.waiting = [(bytes(size), "own", 0)]
+    inputs.poll()
+    assert "OutGauge" in inputs.last_error
+    for k in range(50):
+        at = 10 * k * MS
+        wire.waiting = [(game(0.1 * k), "own", at), *[(bytes(size), "own", at)] * 3]
+        inputs.poll()
+    assert inputs.counters["ignored_outgauge"] == 151
+    assert inputs.counters["refused"] == 0
+    assert inputs.vehicle.spoilage.share(490 * MS) == 0.0
+    assert inputs.vehicle.is_fresh(490 * MS)
+
+
 @pytest.mark.parametrize("key", [None, b"k" * 32])
 def test_what_cannot_be_is_the_owners_fault(key: bytes | None) -> None:
     inputs, wire = room("native", key)

@@ -1,4 +1,4 @@
-"""MotionSim by hand: X left, Y back, Z up, the game's signs."""
+"""MotionSim by hand: X right, Y forward, Z up, the game's signs; genuine: test_beamng_genuine."""
 
 import math
 import struct
@@ -13,7 +13,7 @@ from motion_clients.recording import RecordedSample
 
 from motionserver.core.axes import GRAVITY
 from motionserver.core.state import DriveMode
-from motionserver.sources.base import SourceError
+from motionserver.sources.base import OtherStreamError, SourceError
 from motionserver.sources.beamng import BeamNgSource
 
 SECOND = 1_000_000_000
@@ -26,9 +26,9 @@ def packet(magic: bytes = b"BNG1", **values: tuple[float, float, float]) -> byte
 
 
 def test_the_axes_by_hand() -> None:
-    # accelerating forward is -Y, to the left is +X, up is +Z
+    # accelerating forward is +Y, to the left is -X, up is +Z
     sample = BeamNgSource().decode(
-        packet(acceleration=(2.0, -3.0, 0.5), velocity=(3.0, -4.0, 0.0)), 7
+        packet(acceleration=(-2.0, 3.0, 0.5), velocity=(3.0, -4.0, 0.0)), 7
     )
     assert sample.force == pytest.approx([3.0, 2.0, GRAVITY + 0.5])
     assert sample.speed == pytest.approx(5.0)
@@ -79,7 +79,7 @@ def test_a_jump_of_position_is_a_respawn(moved: float, elapsed: float, mode: Dri
 
 
 def test_the_extended_packet_is_read_by_its_first_88_bytes() -> None:
-    extended = packet(b"BNG2", acceleration=(0.0, -1.0, 0.0)) + bytes(8)
+    extended = packet(b"BNG2", acceleration=(0.0, 1.0, 0.0)) + bytes(8)
     assert BeamNgSource().decode(extended, 0).force[0] == pytest.approx(1.0)
 
 
@@ -99,6 +99,16 @@ def test_what_is_no_packet(data: bytes, reason: str) -> None:
     with pytest.raises(SourceError) as refused:
         BeamNgSource().decode(data, 0)
     assert refused.value.reason == reason
+
+
+@pytest.mark.parametrize("number", [b"", bytes(4)])
+def test_outgauge_is_another_stream_and_says_so(number: bytes) -> None:
+    fields = (0, b"beam", 0, 2, 0, 12.5, 3000.0, 0.0, 80.0, 0.5, 0.0, 90.0, 0, 0, 1.0, 0.0, 0.0)
+    data = struct.pack("<I4sHBBfffffffIIfff16s16s", *fields, b"", b"") + number
+    assert len(data) in (92, 96)
+    with pytest.raises(OtherStreamError, match="OutGauge") as ignored:
+        BeamNgSource().decode(data, 0)
+    assert ignored.value.reason == "outgauge"
 
 
 @given(st.binary(max_size=100) | st.binary(min_size=84, max_size=84).map(lambda b: b"BNG1" + b))
