@@ -12,11 +12,12 @@ from motionserver import __version__
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     help="Motion-cueing server: a driving simulator in, a hexapod out, verified before it moves.",
 )
-ConfigFile = Annotated[Path, typer.Argument(help="configuration, TOML", metavar="CONFIG.toml")]
+ConfigFile = Annotated[
+    Path | None, typer.Argument(help="configuration, TOML", metavar="CONFIG.toml")
+]
 MaybeConfig = Annotated[
     Path | None, typer.Argument(help="configuration of the running server", metavar="CONFIG.toml")
 ]
@@ -40,14 +41,22 @@ def _options(
 
 @app.command()
 def run(
-    config: ConfigFile,
+    config: ConfigFile = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="play everything, send nothing that moves")
     ] = False,
 ) -> None:
     """Run the server: guard, planner and page; parks on Ctrl-C or SIGTERM."""
     from motionserver.cli.serving import serve
+    from motionserver.errors import ConfigError
 
+    if config is None:
+        raise ConfigError(
+            "run",
+            "no configuration is given",
+            "Make one with `motionserver init > my.toml`, adapt it, then `motionserver run "
+            "my.toml`; `motionserver demo` runs without one and without hardware.",
+        )
     raise typer.Exit(serve(config, dry_run))
 
 

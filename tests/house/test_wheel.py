@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 DATA = {
-    "motionserver": (".toml", ".html", ".js", ".css", ".svg"),
+    "motionserver": (".toml", ".html", ".js", ".css", ".svg", ".service", ".json5"),
     "motion_clients": (".csv",),
 }
 
@@ -50,6 +50,7 @@ def test_every_file_of_a_package_is_in_it(names, package, folder):
         ("motionserver/web/static/", 10),
         ("motionserver/presets/platforms/", 1),
         ("motionserver/presets/tunings/", 4),
+        ("motionserver/presets/deploy/", 2),
         ("motion_clients/recordings/", 7),
     ],
 )
