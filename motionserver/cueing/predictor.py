@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from motionserver.bounded_files import MIB, read_bounded_text
 from motionserver.core.axes import Array, frozen
 
 FORMAT: Final = "motionserver-predictor-1"
@@ -20,6 +21,7 @@ FEATURES: Final = 22
 """Length of a row of features, see `reference_learned.Features`."""
 FORCE_FEATURES: Final = 10
 """Those of them at the beginning that hold nothing but the force of that axis."""
+LARGEST_FILE: Final = 4 * MIB
 LARGEST_WEIGHT: Final = 100.0
 """No fit in its right mind has a larger weight."""
 
@@ -68,7 +70,10 @@ def load(path: Path | Traversable) -> Predictor:
         PredictorError: The file cannot be read or holds no predictor.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(path, Path):
+            data = json.loads(read_bounded_text(path, LARGEST_FILE))
+        else:  # of the package itself
+            data = json.loads(path.read_text(encoding="utf-8"))
         if data["format"] != FORMAT:
             raise PredictorError(f"{path}: format {data['format']!r}; this reads {FORMAT!r}")
         horizons = frozen(data["horizons_s"])

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
 from motionserver.core.limits import Machine
 from motionserver.cueing.reference import MODELS
 from motionserver.cueing.tuning import Tuning
@@ -195,7 +196,7 @@ def _values(preset: str) -> dict[str, Any]:
                 f"Give a file ending in .toml or one of {', '.join(built_in)}.",
             ) from error
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(read_bounded_text(path, SETTINGS_BYTES))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"--tuning {preset}", f"cannot be read ({error})", "Mend it.") from error
     values = data.get("values")

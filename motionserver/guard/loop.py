@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from motionserver.bounded_files import read_bounded
 from motionserver.core.device import Feedback
 from motionserver.core.safety.act import Guard
 from motionserver.core.safety.given import Request, TickInput
@@ -29,6 +30,8 @@ from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.ticker import Lateness, Ticker, now_ns, ticks_per_send
 
+LARGEST_SWITCH: Final = 4096
+"""Largest file of the enable switch that is read [bytes]."""
 SNAPSHOT_NS: Final = 30_000_000
 SECOND: Final = 1_000_000_000
 
@@ -245,8 +248,8 @@ def as_request(message: dict[str, Any], enable_input: Path | None) -> Request:
     enabled = True
     if op == "engage" and enable_input is not None:
         try:
-            with enable_input.open("rb") as file:
-                enabled = file.read(16).strip() == b"1"
+            # a named pipe or a device would keep the guard waiting: not read, so not enabled
+            enabled = read_bounded(enable_input, LARGEST_SWITCH).strip() == b"1"
         except OSError:
             enabled = False
     return Request(op, str(message.get("by", "console"))[:20], enabled)

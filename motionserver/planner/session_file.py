@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 from zlib import crc32
 
+from motionserver.bounded_files import MIB, read_bounded
 from motionserver.planner.options import PlannerOptions
 from motionserver.planner.sessions import MOST, Sessions
 from motionserver.telemetry.mapped import MappedFile
@@ -20,6 +21,7 @@ from motionserver.telemetry.mapped import MappedFile
 _MAGIC: Final = b"MCSESS01"
 _HEAD: Final = struct.Struct("<8sII")
 """Magic, number of sessions, CRC-32 of what follows."""
+LARGEST_FILE: Final = MIB
 _PAIR: Final = struct.Struct("<II")
 _RECENT: Final = 16
 """Sessions whose marks a planner that was killed leaves to the next one."""
@@ -80,7 +82,7 @@ class SessionKeeper:
 
     def _kept(self) -> dict[int, int]:
         try:
-            return unpacked(self._file.read_bytes())
+            return unpacked(read_bounded(self._file, LARGEST_FILE))
         except FileNotFoundError:
             return {}
         except (OSError, ValueError) as error:

@@ -7,6 +7,7 @@ import logging
 import time
 from typing import Any
 
+from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
 from motionserver.cueing.tuning import Tuning
 from motionserver.planner.options import PlannerOptions
 from motionserver.settings.fields import TuningError, algorithms
@@ -28,7 +29,7 @@ class Tuner:
         )
         self.side = options.side_engines
         try:
-            kept = json.loads(self._file.read_text("utf-8"))
+            kept = json.loads(read_bounded_text(self._file, SETTINGS_BYTES))
             self._book = TuningBook.from_mapping(kept, machine, time.monotonic)
             self.side = side_names(kept.get("side", self.side))
         except FileNotFoundError:

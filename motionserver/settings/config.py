@@ -14,6 +14,7 @@ from pydantic_settings import (
     SettingsConfigDict,
 )
 
+from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
 from motionserver.errors import ConfigError
 from motionserver.settings.keys import split_address
 from motionserver.settings.problems import config_error, read_toml, unknown_key
@@ -85,7 +86,7 @@ def load_config(path: Path | None, overrides: Mapping[str, Any] | None = None) -
     data: dict[str, Any] = dict(overrides or {})
     if path is not None:
         try:
-            text = path.read_text("utf-8")
+            text = read_bounded_text(path, SETTINGS_BYTES)
         except OSError as error:
             raise ConfigError(
                 str(path),

@@ -7,10 +7,13 @@ import stat
 from pathlib import Path
 from typing import Final
 
+from motionserver.bounded_files import read_with_status
 from motionserver.errors import ConfigError
 
 SHORTEST_KEY: Final = 16
 """Fewest bytes of a key."""
+LONGEST_KEY: Final = 4096
+"""Most bytes of a key."""
 
 
 def read_key(path: Path, where: str) -> bytes:
@@ -24,12 +27,12 @@ def read_key(path: Path, where: str) -> bytes:
         ConfigError: It cannot be read or is too short, or somebody else may read or change it.
     """
     try:
-        with path.open("rb") as stream:
-            about = os.fstat(stream.fileno())
-            key = stream.read()
+        key, about = read_with_status(path, LONGEST_KEY)
     except OSError as error:
         raise ConfigError(
-            where, f"{path} cannot be read ({error.strerror})", "Give a readable file."
+            where,
+            f"{path} cannot be read ({error.strerror})",
+            f"Give a regular file of {SHORTEST_KEY} to {LONGEST_KEY} bytes.",
         ) from error
     mode = stat.S_IMODE(about.st_mode)
     if mode & 0o077:

@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
 from motionserver.core.axes import AXIS_NAMES, frozen
 from motionserver.core.kinematics.hexapod import neutral_conditioning
 from motionserver.core.limits import Machine, Pace
@@ -89,7 +90,7 @@ def load_machine(name: str) -> Machine:
     path = Path(name)
     if name.endswith(".toml"):
         try:
-            text = path.read_text("utf-8")
+            text = read_bounded_text(path, SETTINGS_BYTES)
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else "not UTF-8 text, or no path"
             raise ConfigError(

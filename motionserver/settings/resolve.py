@@ -8,6 +8,7 @@ from math import ceil
 from pathlib import Path
 from typing import Any
 
+from motionserver.bounded_files import SETTINGS_BYTES, FileNotUsableError, check_regular
 from motionserver.core.axes import frozen
 from motionserver.core.limits import machine_to_mapping
 from motionserver.cueing.registry import algorithms
@@ -132,10 +133,14 @@ def _source(source: SourceSection) -> dict[str, Any]:
             "nobody else can reach.",
         )
     secure = str(Path(source.zenoh_config).expanduser()) if source.zenoh_config else ""
-    if secure and not _is_file(Path(secure)):
-        raise ConfigError(
-            f"{where}: zenoh_config", f"{secure}: no such file", "Give Zenoh's configuration."
-        )
+    if secure:
+        try:
+            check_regular(secure, SETTINGS_BYTES)
+        except OSError as error:
+            why = error.strerror if isinstance(error, FileNotUsableError) else "no such file"
+            raise ConfigError(
+                f"{where}: zenoh_config", f"{secure}: {why}", "Give Zenoh's configuration."
+            ) from error
     return {
         "kind": source.kind,
         "host": host,
@@ -146,13 +151,6 @@ def _source(source: SourceSection) -> dict[str, Any]:
         "preview_topic": source.preview_topic,
         "zenoh_config": secure,
     }
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name that is too long, or a folder that may not be entered
-        return False
 
 
 def _is_loopback(host: str) -> bool:

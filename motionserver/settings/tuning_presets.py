@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import tomli_w
 
+from motionserver.bounded_files import FileNotUsableError, read_bounded
 from motionserver.settings.fields import FieldError, TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes
 
@@ -71,11 +72,12 @@ class PresetShelf:
         if name in self._built_in:
             return _parsed(name, self._built_in[name], built_in=True)
         try:
-            with self._path(name).open("rb") as stream:
-                text = stream.read(_LARGEST + 1)
+            text = read_bounded(self._path(name), _LARGEST)
+        except FileNotUsableError as error:
+            raise _error(name, None, "a regular file", str(error.strerror)) from None
         except OSError:
             raise KeyError(name) from None
-        return _parsed(name, text[:_LARGEST].decode("utf-8", "replace"), built_in=False)
+        return _parsed(name, text.decode("utf-8", "replace"), built_in=False)
 
     def save(self, name: str, about: str, values: dict[str, Any]) -> Preset:
         """Save a preset of the user; it is on disk, whole, when this returns.

@@ -19,6 +19,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from motionserver.bounded_files import MIB, SETTINGS_BYTES, read_bounded
+
+LARGEST_LOG: Final = 256 * MIB
+"""Largest file of a log that is read; one is put aside long before."""
 RESUME: Final = "resume"
 """Action of the line that a writer begins with where the end is not what it had left."""
 
@@ -106,7 +110,7 @@ def head_path(path: Path) -> Path:
 def read_head(path: Path) -> Head | None:
     """What is kept beside the log ``path``; None if there is nothing that can be read."""
     try:
-        data = json.loads(head_path(path).read_bytes())
+        data = json.loads(read_bounded(head_path(path), SETTINGS_BYTES))
         return Head(str(data["head"]), tuple(map(str, data["begins"])))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -118,7 +122,7 @@ def read_lines(path: Path) -> list[Line]:
     Raises:
         OSError: It cannot be read.
     """
-    *whole, last = path.read_bytes().split(b"\n")
+    *whole, last = read_bounded(path, LARGEST_LOG).split(b"\n")
     lines = [Line(path.name, i, text, _entry(text)) for i, text in enumerate(whole, start=1)]
     if last:
         lines.append(Line(path.name, len(lines) + 1, last, _entry(last), is_ended=False))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
+from motionserver.bounded_files import SETTINGS_BYTES, check_regular
 from motionserver.core.limits import Machine, machine_from_mapping
 from motionserver.errors import MotionServerError
 
@@ -91,8 +92,18 @@ class WebConfig:
             raise WebConfigError("tls_cert and tls_key: give both or none")
         for name in ("tls_cert", "tls_key"):
             path = getattr(self, name)
-            if path is not None and not path.is_file():
+            if path is None:
+                continue
+            if not path.exists():
                 raise WebConfigError(f"{name} = {path}: no such file")
+            try:
+                check_regular(path, SETTINGS_BYTES)
+            except OSError as error:
+                raise WebConfigError(f"{name} = {path}: {error.strerror}") from error
+        for name in ("tokens_file", "audit_file"):
+            path = getattr(self, name)
+            if path.exists() and not path.is_file():
+                raise WebConfigError(f"{name} = {path}: is not a regular file; name another")
         if self.tls_key is not None and (mode := stat.S_IMODE(self.tls_key.stat().st_mode)) & 0o007:
             raise WebConfigError(
                 f"tls_key = {self.tls_key}: mode {mode:04o} lets every user of this computer read "

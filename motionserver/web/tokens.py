@@ -14,6 +14,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Final
 
+from motionserver.bounded_files import read_with_status
 from motionserver.web.config import WebConfigError
 
 _HASHED: Final = "sha256:"
@@ -64,9 +65,7 @@ def load_tokens(path: Path) -> Tokens:
     try:
         if not path.exists():
             _make(path)
-        with path.open("rb") as stream:
-            about = os.fstat(stream.fileno())
-            text = stream.read(_LARGEST)
+        text, about = read_with_status(path, _LARGEST)
     except OSError as error:
         raise WebConfigError(f"{path}: {error.strerror}; it must be ours to read") from error
     mode = stat.S_IMODE(about.st_mode)

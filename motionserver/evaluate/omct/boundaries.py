@@ -21,6 +21,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
 from motionserver.core.axes import Array, frozen
 from motionserver.errors import ConfigError
 from motionserver.evaluate.omct.run import Point
@@ -82,7 +83,7 @@ def read_boundaries(path: Path) -> Boundaries:
     """
     where = f"--boundaries {path}"
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(read_bounded_text(path, SETTINGS_BYTES))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(where, f"cannot be read ({error})", "Mend the file.") from error
     rows = data.get("boundary")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import tomli_w
 
 from motionserver import __version__
+from motionserver.bounded_files import MIB, read_bounded_text
 from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
 from motionserver.evaluate.tune.result import TuneResult
@@ -16,6 +17,8 @@ from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes
 
 SCHEMA = "motionserver-tuning-1"
+LARGEST_RESULT: Final = 64 * MIB
+"""Largest ``result.json`` that is read."""
 
 
 def preset_name(result: TuneResult) -> str:
@@ -101,7 +104,7 @@ def read_fold_tunings(path: str | Path) -> dict[str, Tuning]:
         ConfigError: The file is not one.
     """
     try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
+        data = json.loads(read_bounded_text(path, LARGEST_RESULT))
         if data["schema"] != SCHEMA:
             raise ValueError(f"its schema is {data['schema']!r}, not {SCHEMA!r}")
         base = TuningModel.model_validate(data["base"])

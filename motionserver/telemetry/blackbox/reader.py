@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import gzip
+import io
 import json
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -12,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+from motionserver.bounded_files import MIB, read_bounded
 from motionserver.errors import MotionServerError
 from motionserver.telemetry.blackbox.dump import FORMAT
 
@@ -33,6 +35,11 @@ _NEAR: Final = 10.0
 """Rates and lateness are told of so much time before the fault [s]."""
 
 
+LARGEST_DUMP: Final = 64 * MIB
+"""Largest dump that is read; one of a minute has about 1 MB."""
+_LARGEST_UNPACKED: Final = 1024 * MIB
+
+
 class DumpError(MotionServerError):
     """A dump cannot be read or its samples not be written; the text says why."""
 
@@ -44,13 +51,21 @@ def read_dump(path: Path) -> dict[str, Any]:
         DumpError: It cannot be read, or is no dump of this version.
     """
     try:
-        data = json.loads(gzip.decompress(path.read_bytes()))
+        data = json.loads(_unpacked(read_bounded(path, LARGEST_DUMP)))
         if data["format"] != FORMAT:
             raise ValueError(f"format {data['format']!r}, not {FORMAT!r}")
     except (OSError, EOFError, ValueError, LookupError, TypeError) as error:
         raise DumpError(f"{path}: no dump of the black box ({error})") from error
     out: dict[str, Any] = data
     return out
+
+
+def _unpacked(packed: bytes) -> bytes:
+    with gzip.open(io.BytesIO(packed)) as stream:
+        data = stream.read(_LARGEST_UNPACKED + 1)
+    if len(data) > _LARGEST_UNPACKED:
+        raise ValueError(f"it unpacks to more than {_LARGEST_UNPACKED // MIB} MiB")
+    return data
 
 
 def summary(data: dict[str, Any]) -> str:
