@@ -18,7 +18,6 @@ from motionserver.core.kinematics.rotation import felt
 from motionserver.core.plan import pack
 from motionserver.core.safety.patient import time_of_check
 from motionserver.core.safety.states import CUED, State
-from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import STILL, Stimulus, VehicleMotion
 from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
@@ -30,6 +29,7 @@ from motionserver.planner.reply import status_packet
 from motionserver.planner.session_file import keeper_of
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
+from motionserver.planner.source_report import SourceReport
 from motionserver.planner.tuner import Tuner
 from motionserver.planner.wake import next_wake
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
@@ -67,6 +67,7 @@ class PlannerLoop:
             keeper_of(options, run_dir),
             int(options.period * SECOND),
         )
+        self._source_report = SourceReport(self._inputs)
         self._intake = Intake()
         self._measured = MeasuredForce()
         self._measured_ns = 0
@@ -138,8 +139,7 @@ class PlannerLoop:
             self._intake.offer(motion)
         self._state = self._clock.read(now)
         gate = self._inputs.vehicle
-        newest = gate.believed_ns(now, self._state in CUED)
-        status = CueStatus(newest, gate.freshness.stale_after_ns(), gate.mode)
+        status = self._source_report.status(now, self._state in CUED)
         self._maps.cue.write(pack_cue(status, now))
         tuning = self._thinker.tuning
         wanted = self._state is State.RUN and gate.is_fresh(now)

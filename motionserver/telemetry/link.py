@@ -17,7 +17,9 @@ from motionserver.telemetry.trace import TRACE_BYTES
 
 STATES: Final = tuple(State)
 _CLOCK: Final = struct.Struct("<BQdQQQ")
-_CUE: Final = struct.Struct("<QQBQ")
+_CUE: Final = struct.Struct("<QQBQQ")
+_TROUBLE_BYTES: Final = 300
+"""Longest sentence about the source's packets [bytes of UTF-8]."""
 SEQUENCE: Final = struct.Struct("<Q")
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 _WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
@@ -54,19 +56,24 @@ class GuardClock:
 
 
 def pack_cue(status: CueStatus, now_ns: int) -> bytes:
-    """Write the planner's view of the source, with the planner's own heartbeat."""
-    return _CUE.pack(status.newest_ns, status.stale_after_ns, status.mode, now_ns)
+    """Write what the planner knows of the source, looked at ``now_ns``; long sentences are cut."""
+    head = _CUE.pack(status.newest_ns, status.stale_after_ns, status.mode, now_ns, status.heard_ns)
+    return head + status.trouble.encode("utf-8", "replace")[:_TROUBLE_BYTES]
 
 
 def unpack_cue(data: bytes) -> CueStatus:
     """Read what `pack_cue` wrote.
 
     Raises:
-        ValueError: The mode is unknown.
-        struct.error: The length is wrong.
+        ValueError: The mode is unknown, or the sentence is too long.
+        struct.error: It is too short.
     """
-    newest, stale_after, mode, _ = _CUE.unpack(data)
-    return CueStatus(newest, stale_after, DriveMode(mode))
+    newest, stale_after, mode, looked, heard = _CUE.unpack_from(data)
+    trouble = data[_CUE.size :]
+    if len(trouble) > _TROUBLE_BYTES:
+        raise ValueError(f"a sentence of {len(trouble)} bytes, allowed {_TROUBLE_BYTES}")
+    words = "".join(c if c.isprintable() else " " for c in trouble.decode("utf-8", "ignore"))
+    return CueStatus(newest, stale_after, DriveMode(mode), heard, words, looked)
 
 
 class Maps:
@@ -93,7 +100,7 @@ class Maps:
         self.proposal = opened("proposal", PLAN_BYTES)
         self.accepted = opened("accepted", PLAN_BYTES)
         self.clock = opened("clock", _CLOCK.size)
-        self.cue = opened("cue", _CUE.size)
+        self.cue = opened("cue", _CUE.size + _TROUBLE_BYTES)
         self.will = opened("will", _WILL_BYTES)
         self.sent = opened("sent", SEQUENCE.size)
         self.guard = opened("guard", 32768)

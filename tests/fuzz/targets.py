@@ -196,7 +196,7 @@ TARGETS = {
         Target("plan", targets_maps.plan,
                Shape(_fields("<QQdII"), _mend_plan, repeat=(32, 8, "<d")), 0.06),
         Target("will", targets_will.will, Shape([], _mend_will, _WILL), 0.01),
-        Target("link", targets_maps.link, Shape(_fields("<QQBQ") + _fields("<BQdQQQ")), 0.04),
+        Target("link", targets_maps.link, Shape(_fields("<QQBQQ") + _fields("<BQdQQQ")), 0.04),
         Target("request", targets_maps.request, Shape(tokens=_REQUEST), 0.01),
         Target("mapped", targets_maps.mapped,
                Shape(_fields("<II") + _fields("<QII", 8), _mend_mapped), 0.015),

@@ -46,17 +46,19 @@ def plan(data):
 
 
 def link(data):
-    """The two records of a fixed length between planner and guard."""
+    """The two small records between planner and guard."""
     try:
         status = unpack_cue(data)
     except (ValueError, struct.error) as error:
-        must(len(data) != 25 or data[16] > 3, "told too little")
+        must(not 33 <= len(data) <= 333 or data[16] > 3, "told too little")
         must(str(error), "told too little")
         status = None
     if status is not None:
-        assert len(data) == 25
+        assert 33 <= len(data) <= 333
         assert int(status.mode) == data[16] <= 3
         assert (status.newest_ns, status.stale_after_ns) == struct.unpack_from("<QQ", data)
+        assert (status.looked_ns, status.heard_ns) == struct.unpack_from("<QQ", data, 17)
+        assert status.trouble.isprintable() or not status.trouble
         for now in (1, status.newest_ns + 300_000_001):
             assert status.is_stale(now) or now - status.newest_ns <= 300_000_000
     try:

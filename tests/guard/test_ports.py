@@ -19,7 +19,7 @@ from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import DRAIN, Ports, open_link
 from motionserver.platforms.base import PlatformOptions
 from motionserver.settings.machine import load_machine
-from motionserver.telemetry.link import Maps, pack_cue
+from motionserver.telemetry.link import Maps, pack_cue, unpack_cue
 from motionserver.telemetry.sieve import unsieve
 
 SLOT = struct.Struct("<QII")
@@ -121,13 +121,40 @@ def test_cues_are_read_once_and_nonsense_is_counted(scene: Scene) -> None:
     assert scene.ports.cue() is None
     status = CueStatus(5, 6, DriveMode.PAUSE)
     scene.maps.cue.write(pack_cue(status, 7))
-    assert scene.ports.cue() == status
+    found = scene.ports.cue()
+    assert found == status
+    assert found is not None
+    assert found.looked_ns == 7
     assert scene.ports.cue() is None
     scene.maps.cue.write(struct.pack("<QQBQ", 1, 1, 99, 1))
     assert scene.ports.cue() is None
     scene.maps.cue.write(b"short")
     assert scene.ports.cue() is None
-    assert scene.counters["cue_malformed"] == 2
+    scene.maps.cue.write(struct.pack("<QQBQQ", 1, 1, 99, 1, 1))
+    assert scene.ports.cue() is None
+    assert scene.counters["cue_malformed"] == 3
+
+
+def test_a_cue_status_carries_what_is_wrong_with_the_source(scene: Scene) -> None:
+    status = CueStatus(0, 6, DriveMode.DRIVE, 4, "the body rate is 57 rad/s: is it in rad/s? °")
+    scene.maps.cue.write(pack_cue(status, 7))
+    assert scene.ports.cue() == status
+
+
+def test_a_sentence_that_is_too_long_is_cut_and_one_that_is_none_is_made_printable(
+    scene: Scene,
+) -> None:
+    scene.maps.cue.write(pack_cue(CueStatus(trouble="°" * 299), 7))
+    found = scene.ports.cue()
+    assert found is not None
+    assert found.trouble == "°" * 150
+    head = pack_cue(CueStatus(), 7)
+    scene.maps.cue.write(head + b"two\nlines\x1b \xc3")
+    found = scene.ports.cue()
+    assert found is not None
+    assert found.trouble == "two lines  "
+    with pytest.raises(ValueError, match="a sentence of 301 bytes, allowed 300"):
+        unpack_cue(head + b"x" * 301)
 
 
 def test_proposals_are_read_once_and_nonsense_is_rejected(scene: Scene) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -62,14 +62,24 @@ class CueStatus:
     """What the planner knows of the source, re-judged here by age.
 
     Attributes:
-        newest_ns: Arrival of the newest believed packet, CLOCK_MONOTONIC [ns]; 0 = none yet.
+        newest_ns: Arrival of the newest packet that may move the platform, CLOCK_MONOTONIC [ns];
+            0 = none.
         stale_after_ns: Age beyond which it is stale [ns].
         mode: What the simulator says it is doing.
+        heard_ns: Arrival of the owner's newest packet, whether it may move the platform or not
+            [ns]; 0 = none yet.
+        trouble: What is wrong with the packets that arrive, as a sentence for people; empty if
+            nothing is. It explains, it never decides.
+        looked_ns: When the planner looked [ns]; 0 = it has not reported yet. Says how late the
+            planner is, nothing about the source.
     """
 
     newest_ns: int = 0
     stale_after_ns: int = 0
     mode: DriveMode = DriveMode.DRIVE
+    heard_ns: int = 0
+    trouble: str = ""
+    looked_ns: int = field(default=0, compare=False)
 
     def is_stale(self, now_ns: int) -> bool:
         """True if nothing came for too long, or ever."""
