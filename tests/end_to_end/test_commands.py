@@ -148,15 +148,15 @@ def test_a_running_server_that_is_wrong_from_the_start_says_so_in_one_line(
                 tmp_path / "e.toml", **{**good, "server": {"run_dir": "/etc/hostname/x"}}
             ),
             "holds mine.txt": write(
-                tmp_path / "h.toml", **{**good, "server": {"run_dir": str(tmp_path / "somebodys")}}
+                tmp_path / "h.toml", **{**good, "server": {"run_dir": str(tmp_path / "mine")}}
             ),
             "too long a path": write(
                 tmp_path / "f.toml", **{**good, "server": {"run_dir": str(tmp_path / ("x" * 90))}}
             ),
         }
         (tmp_path / "broken.toml").write_text("[platform\n", "utf-8")
-        (tmp_path / "somebodys").mkdir()
-        (tmp_path / "somebodys" / "mine.txt").write_text("mine", "utf-8")
+        (tmp_path / "mine").mkdir()
+        (tmp_path / "mine" / "mine.txt").write_text("mine", "utf-8")
         for words, path in cases.items():
             ended = cli("run", path)
             assert (ended.returncode, ended.stdout) == (2, ""), words

@@ -22,6 +22,7 @@ _SOURCES: Final = (
     "core/**/*.py",
     "cueing/**/*.py",
     "solvers/**/*.py",
+    "bounded_files.py",
     "errors.py",
     "evaluate/disturbance.py",
     "evaluate/drive.py",
