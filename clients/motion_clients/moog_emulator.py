@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from .arrival_stamps import StampingSocket, bound_socket
 from .flawed_link import FlawedLink, LinkFlaws
 from .force_sender import ForceSender
 from .moog_config import MoogConfig
@@ -89,6 +90,7 @@ class Emulator(asyncio.DatagramProtocol):
         self._hosts: set[Address] = set()
         self._replies = 0
         self._transport: asyncio.DatagramTransport | None = None
+        self._socket: StampingSocket | None = None
         self._ticking: asyncio.Task[None] | None = None
 
     @property
@@ -109,9 +111,10 @@ class Emulator(asyncio.DatagramProtocol):
             OSError: The address cannot be bound.
         """
         loop = asyncio.get_running_loop()
-        self._transport, _ = await loop.create_datagram_endpoint(
-            lambda: self, local_addr=self._listen
-        )
+        self._socket = bound_socket(self._listen)
+        if not self._socket.is_stamping:
+            self.judge.trust_no_instants()
+        self._transport, _ = await loop.create_datagram_endpoint(lambda: self, sock=self._socket)
         self.device.advance(time.monotonic())
         self._ticking = asyncio.create_task(self._tick(time.monotonic()))
         return self.address
@@ -125,7 +128,7 @@ class Emulator(asyncio.DatagramProtocol):
             self._ticking = None
         if self._transport is not None:
             self._transport.close()
-            self._transport = None
+            self._transport = self._socket = None
             await asyncio.sleep(0)  # asyncio closes the socket on its next turn
 
     async def __aenter__(self) -> Self:
@@ -154,13 +157,13 @@ class Emulator(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Take one datagram off the socket."""
-        now_ns = time.monotonic_ns()
-        now = now_ns * 1e-9
+        now = time.monotonic()
+        arrived_ns = time.monotonic_ns() if self._socket is None else self._socket.arrived_ns
         if self._log is not None:
-            self._log.write(now_ns, data)
+            self._log.write(arrived_ns, data)
         self._hosts.add(addr[:2])
         self.device.advance(now)
-        self.judge.observe(data, now, self.device)
+        self.judge.observe(data, arrived_ns * 1e-9, self.device)
         for arrival in self.to_base.carry(now, data):
             self._after(arrival.delay, partial(self._deliver, arrival.datagram, addr))
 
