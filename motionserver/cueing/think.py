@@ -38,6 +38,15 @@ class Thought:
     trouble: str = ""
 
 
+def prepare(machine: Machine, tuning: Tuning, period: float) -> Cueing:
+    """Make the algorithm that a `Thinker` drives with, off to the side.
+
+    Raises:
+        Exception: It cannot be made: `TunableError` from ours, anything from a plug-in.
+    """
+    return make_cueing(machine, tuning, period)
+
+
 class Thinker:
     """The driving algorithm with its tuning, behind the governor.
 
@@ -77,14 +86,6 @@ class Thinker:
         except Exception:  # a plug-in must not keep the page from being answered
             return self.tuning
         return replace(told, algorithm=self.tuning.algorithm, scale=self.tuning.scale)
-
-    def prepare(self, target: Tuning) -> Cueing:
-        """Make the algorithm with these tunables off to the side; nothing here changes.
-
-        Raises:
-            Exception: It cannot be made: `TunableError` from ours, anything from a plug-in.
-        """
-        return make_cueing(self.machine, target, self.period)
 
     def retune(
         self, target: Tuning, warm: Cueing | None = None, fresh: Cueing | None = None

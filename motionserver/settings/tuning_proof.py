@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from motionserver.core.limits import Machine
 from motionserver.cueing.base import Cueing
-from motionserver.cueing.registry import make_cueing, tunables_of
+from motionserver.cueing.registry import tunables_of
+from motionserver.cueing.think import prepare
 from motionserver.errors import TunableError
 from motionserver.settings.fields import FieldError, TuningError
 from motionserver.settings.tuning import TuningModel
@@ -29,7 +30,7 @@ def make_with(
     try:
         tunables_of(model.algorithm)
         check_options(model.algorithm)
-        return make_cueing(machine, model.to_tuning(), period)
+        return prepare(machine, model.to_tuning(), period)
     except Exception as error:
         raise TuningError([_fault(error, model, former or TuningModel())]) from error
 

@@ -213,9 +213,8 @@ def test_in_force_is_read_from_the_engine_and_not_an_echo(planner):
 def test_engine_that_does_not_take_a_change_keeps_the_old_one_and_says_so(planner, monkeypatch):
     planner.settle()
     monkeypatch.setattr(planner.thinker.cueing, "retune", _raise)
+    assert planner.tune(scale=0.3)["ok"]
     monkeypatch.setattr("motionserver.cueing.think.make_cueing", _raise)
-    answer = planner.tune(scale=0.3)
-    assert answer["ok"]
     planner.think(80)
     told = planner.ask("tuning")
     assert (told["in_force"]["scale"], told["is_ramping"]) == (0.6, False)
@@ -352,7 +351,7 @@ def test_side_engine_that_is_accepted_runs(planner):
 
 
 def test_error_of_a_plug_in_names_the_one_change_at_fault(monkeypatch):
-    monkeypatch.setattr("motionserver.settings.tuning_proof.make_cueing", _raise)
+    monkeypatch.setattr("motionserver.settings.tuning_proof.prepare", _raise)
     default = default_for(MACHINE)
     with pytest.raises(TuningError) as caught:
         make_with(MACHINE, PERIOD, apply_changes(default, {"scale": 0.1}), default)

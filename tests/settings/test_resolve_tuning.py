@@ -33,7 +33,7 @@ def test_side_engine_that_cannot_be_made_is_refused_by_name(tmp_path, without_hp
 
 def test_horizon_that_does_not_fit_the_planners_rate_is_refused(tmp_path):
     slow = {"platform": {"rate_hz": 20.0}, "cueing": {"tuning": {"horizon_s": 0.5}}}
-    with pytest.raises(ConfigError, match="horizon_s = 0.5: .*pieces do not fit"):
+    with pytest.raises(ConfigError, match=r"horizon_s = 0\.5: .*pieces do not fit"):
         resolve(load_config(None, slow), tmp_path)
 
 
