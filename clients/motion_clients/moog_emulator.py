@@ -30,6 +30,13 @@ Mishap = tuple[float, Callable[[MoogDevice], None]]
 DEFAULT_PORT = 991
 """UDP port of the real base; binding it takes privileges."""
 
+ENDING = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+    if hasattr(signal, name)
+)
+"""What switches a base off that runs by itself; its verdict is written."""
+
 _TICK = 0.005  # [s], how often the base is advanced while nothing arrives
 
 
@@ -217,7 +224,7 @@ def run_emulator(
     seed: int = 0,
     on_ready: Callable[[Address], None] | None = None,
 ) -> dict[str, object]:
-    """Run a base until SIGINT or SIGTERM, or for ``duration`` seconds.
+    """Run a base until one of :data:`ENDING`, or for ``duration`` seconds.
 
     Args:
         listen_host: Address to bind.
@@ -247,7 +254,7 @@ def run_emulator(
     async def run(log: MotionLog, send_force: SendForce | None) -> dict[str, object]:
         done = asyncio.Event()
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDING:
             loop.add_signal_handler(number, done.set)
         emulator = Emulator(
             config,

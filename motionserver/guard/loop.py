@@ -78,7 +78,6 @@ class GuardLoop:
         loop = asyncio.get_running_loop()
         self._done = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         gc.freeze()
         gc.disable()
         ticker = Ticker(self._wake)

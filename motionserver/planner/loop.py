@@ -38,6 +38,7 @@ from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
+from motionserver.telemetry.signals import let_through
 from motionserver.telemetry.ticker import Ticker, now_ns, ticks_per_send
 
 SECOND: Final = 1_000_000_000
@@ -90,7 +91,7 @@ class PlannerLoop:
         loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self._finish)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        let_through()
         gc.collect()
         gc.freeze()
         gc.disable()
