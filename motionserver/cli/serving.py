@@ -21,7 +21,6 @@ from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.requests import RequestError, ask
-from motionserver.telemetry.signals import PARKING, ignore_signals
 from motionserver.telemetry.ticker import now_ns
 from motionserver.web.config import config_from
 
@@ -32,7 +31,6 @@ class NotRunningError(MotionServerError):
 
 def serve(path: Path, dry_run: bool) -> int:
     """Run a server until a signal; returns its exit status."""
-    ignore_signals(but=PARKING)
     config = load_config(path)
     logging.basicConfig(
         level=config.server.log_level.upper(), format="%(asctime)s %(name)s %(message)s"
@@ -84,7 +82,8 @@ def describe(path: Path) -> str:
         + describe_pose(machine.parked_pose),
         f"unchecked  {', '.join(resolved['unchecked']) or 'nothing'}",
         f"planner    {planner['tuning']['algorithm']}, scale {planner['tuning']['scale']:g}, "
-        f"{1 / planner['period']:.1f} Hz, {planner['budget'] * 1e3:.1f} ms before the packet",
+        f"{1 / planner['period']:.1f} Hz, at first {planner['budget'] * 1e3:.1f} ms "
+        "before the packet",
     ]
     if planner["side_engines"]:
         lines.append(f"beside     {', '.join(planner['side_engines'])}")

@@ -15,12 +15,20 @@ from motionserver.core.device import Feedback
 from motionserver.core.plan import Plan, unpack
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
+from motionserver.core.safety.verdict import Reason
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.safety.will import Will, WillWriter, unpack_will
 from motionserver.guard.options import GuardOptions
 from motionserver.platforms.base import PlatformPacketError
 from motionserver.platforms.registry import make_platform
-from motionserver.telemetry.link import SENT, STATES, GuardClock, Maps, unpack_cue
+from motionserver.telemetry.link import (
+    REASONS,
+    SEQUENCE,
+    STATES,
+    GuardClock,
+    Maps,
+    unpack_cue,
+)
 from motionserver.telemetry.sieve import dropped, sieve
 from motionserver.telemetry.ticker import now_ns
 
@@ -46,8 +54,8 @@ class Ports:
         self._seen_proposal = self._maps.proposal.newest_sequence()
         self._seen_cue = 0
         self._accepted_id = 0
-        self.sent_ns = 0
-        """When the last packet had gone out, at the latest [ns]."""
+        self._taken_id = 0
+        self._told_of = (0, 0)
         self._keep = keep
         self._writer = WillWriter()
         # strangers are dropped in the kernel: a flood leaves the buffer to the platform's answers
@@ -101,19 +109,22 @@ class Ports:
             return None
         self._seen_proposal = message[0]
         try:
-            return unpack(message[1])
+            plan = unpack(message[1])
         except ValueError:
             self._counters["rejected_malformed"] += 1
             self._counters["plans_rejected"] += 1
             return None
+        self._taken_id = plan.plan_id
+        return plan
 
     def has_news(self, record: GuardRecord) -> bool:
-        """True if a plan was accepted that the planner does not know of yet."""
+        """True if a plan was taken, decided about or accepted, and the planner was not told."""
         playback = record.playback
-        return playback is not None and playback.newest.plan.plan_id != self._accepted_id
+        is_new = playback is not None and playback.newest.plan.plan_id != self._accepted_id
+        return is_new or (self._taken_id, record.judged_id) != self._told_of
 
     def publish(self, sent: int, now: int, due: int, record: GuardRecord) -> None:
-        """Tell the planner what is accepted, before the packet goes out."""
+        """Tell the planner what is accepted and what was decided, before the packet goes out."""
         playback = record.playback
         newest = None if playback is None else playback.newest.plan
         if newest is not None and newest.plan_id != self._accepted_id:
@@ -121,6 +132,7 @@ class Ports:
             self._maps.accepted.write(packed)
             self._keep(packed)
             self._accepted_id = newest.plan_id
+        self._told_of = (self._taken_id, record.judged_id)
         self._maps.clock.write(
             GuardClock(
                 STATES.index(record.state),
@@ -129,6 +141,11 @@ class Ports:
                 sent,
                 due,
                 now,
+                self._taken_id,
+                record.judged_id,
+                0 if record.refusal is None else 1 + REASONS.index(record.refusal),
+                0 if playback is None else len(playback.pending),
+                record.counters[f"rejected_{Reason.TOO_LATE}"],
             ).pack()
         )
 
@@ -139,14 +156,13 @@ class Ports:
         except OSError:
             self._counters["send_errors"] += 1
             return False
-        self.sent_ns = now_ns()
         self.settle()
         self._counters["packets_sent"] += 1
         return True
 
     def settle(self) -> None:
         """Tell a successor that the packet of the newest will has gone out."""
-        self._maps.sent.write(SENT.pack(self._maps.will.newest_sequence(), self.sent_ns))
+        self._maps.sent.write(SEQUENCE.pack(self._maps.will.newest_sequence()))
 
     def leave(self, will: Will) -> None:
         """Write down what a successor needs, before the packet it tells of goes out.
@@ -158,11 +174,10 @@ class Ports:
         except ValueError:
             self._counters["wills_too_long"] += 1
 
-    def left(self) -> tuple[Will, int | None] | None:
-        """What the guard before left, and when the packet of it had gone out at the latest [ns].
+    def left(self) -> tuple[Will, bool] | None:
+        """What the guard before left, and whether it said that the packet of it went out.
 
-        The instant is None if it did not say that the packet went out. All is None if there was no
-        guard before, or what it left cannot be read.
+        None if there was none, or it cannot be read.
         """
         message, sent = self._maps.will.read(), self._maps.sent.read()
         if message is None:
@@ -172,13 +187,7 @@ class Ports:
         except ValueError:
             self._counters["wills_malformed"] += 1
             return None
-        sequence, sent_ns = (0, 0) if sent is None else SENT.unpack(sent[1])
-        return will, sent_ns if sequence == message[0] else None
-
-    @property
-    def has_predecessor(self) -> bool:
-        """Whether another guard has left something, readable or not."""
-        return self._maps.will.newest_sequence() > 0
+        return will, sent is not None and SEQUENCE.unpack(sent[1])[0] == message[0]
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

@@ -32,13 +32,13 @@ from motionserver.planner.sides import Sides
 from motionserver.planner.source_report import SourceReport
 from motionserver.planner.tuner import Tuner
 from motionserver.planner.wake import next_wake
+from motionserver.planner.wake_ahead import MARGIN_NS, WakeAhead
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
-from motionserver.telemetry.signals import let_through
 from motionserver.telemetry.ticker import Ticker, now_ns, ticks_per_send
 
 SECOND: Final = 1_000_000_000
@@ -58,11 +58,8 @@ class PlannerLoop:
         self._requests = RequestServer(run_dir / "planner.sock")
         self._tuner = Tuner(options)
         homes = frozen(np.stack((np.zeros(6), options.machine.parked_pose)))
-        self._thinker = Thinker(
-            options.machine, self._tuner.tuning(), options.period, homes, self._tuner.cueing
-        )
+        self._thinker = Thinker(options.machine, self._tuner.tuning(), options.period, homes)
         self._sides = Sides(options.machine, options.period, homes, self._tuner.side)
-        self._clock = HandoverClock(self._maps, options.send_period)
         self._state: State | None = None
         self._inputs = Inputs(
             [open_input(one) for one in options.inputs],
@@ -81,6 +78,10 @@ class PlannerLoop:
         # a guard of short ticks needs some of them for its verdict
         tick = options.send_period / ticks_per_send(1.0 / options.send_period)
         self._check_ns = int(time_of_check(tick) * SECOND)
+        self._clock = HandoverClock(self._maps, options.send_period, options.period, self._check_ns)
+        self._ahead = WakeAhead(
+            int(options.budget * SECOND), int(options.period * SECOND), self._check_ns
+        )
         self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None
@@ -91,7 +92,7 @@ class PlannerLoop:
         loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self._finish)
-        let_through()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -122,14 +123,14 @@ class PlannerLoop:
         self._arm(now_ns())
 
     def _arm(self, now: int) -> None:
-        """Wake one budget ahead of a send slot; at the plain period while no guard is heard."""
+        """Wake ahead of a send slot; at the plain period while no guard is heard."""
         period = int(self.options.period * SECOND)
         clock = self._clock.clock
         if clock is None:
             wake = max(self._due_ns + period, now)
         else:
             slot = int(self.options.send_period * SECOND)
-            first = clock.due_ns - int(self.options.budget * SECOND)
+            first = clock.due_ns - self._ahead.ahead_ns
             wake = next_wake(first, slot, self._due_ns + period, period, now)
         self._due_ns = wake
         if self._ticker is not None:
@@ -151,7 +152,9 @@ class PlannerLoop:
         if self._state not in CUED:
             stimulus = STILL
             self._intake.gain = 0.0
-        handover = self._clock.handover(now, self._timing.expected_ns + self._check_ns)
+        # late for its slot it aims at the next one; early it does not hurry
+        ready = max(now + self._timing.expected_ns + self._check_ns, self._ready_ns())
+        handover = self._clock.handover(now, ready - now)
         if handover is not None:
             self._think(now, handover, stimulus, sensor)
         self._serve(handover)
@@ -160,12 +163,12 @@ class PlannerLoop:
         if handover is not None:
             self._sides.think(stimulus, self._due_ns + int(self.options.period * SECOND))
         elif self._state not in CUED:
-            self._thinker.settle()
             self._sides.stand()
-        else:
-            self._thinker.ramp()
-        self._tuner.look(self._thinker)
         self._show(now, stimulus, handover is not None)
+
+    def _ready_ns(self) -> int:
+        """When the plan of this period is to be ready: just before its send slot [ns]."""
+        return self._due_ns + self._ahead.ahead_ns - MARGIN_NS
 
     def _show(self, now: int, stimulus: Stimulus, has_thought: bool) -> None:
         trace = self._view.trace(
@@ -185,6 +188,7 @@ class PlannerLoop:
                     self._tuner,
                     self._measured,
                     self._sides,
+                    {**self._clock.shown(), "ahead_ms": round(self._ahead.ahead_ns / 1e6, 2)},
                 )
             )
 
@@ -200,12 +204,18 @@ class PlannerLoop:
             parent, handover.before, handover.takeover, stimulus, now
         )
         took = now_ns() - begun
+        done = now_ns()
         if thought.proposal is not None:
-            packed = pack(thought.proposal.plan)
-            self._maps.proposal.write(packed)
-            self._box.proposed(packed)
-            self._clock.proposed(thought.proposal.plan)
-        self._timing.thought(now_ns() - now)
+            plan = thought.proposal.plan
+            if self._clock.may_propose(plan, done):
+                packed = pack(plan)
+                self._maps.proposal.write(packed)
+                self._box.proposed(packed)
+                self._clock.proposed(plan, done)
+            else:
+                self._inputs.counters["plans_withheld"] += 1
+        self._timing.thought(done - now)
+        self._ahead.took(done - now + self._timing.late_ns)
         scores, proposal = self._sides.driving, thought.proposal
         scores.heard(parent, handover.takeover, stimulus)
         scores.thought(None if proposal is None else proposal.kappa, took / SECOND)
@@ -229,20 +239,20 @@ class PlannerLoop:
     def _serve(self, handover: Handover | None) -> None:
         for message, address in self._requests.poll():
             if message["op"] == "side":
-                answer = self._tuner.serve_side(message, self._sides, self._thinker.tuning)
+                answer, names = self._tuner.serve_side(message)
+                if names is not None:
+                    self._sides.want(names)
             else:
-                answer, tuning = self._tuner.serve(message, self._thinker)
+                answer, tuning = self._tuner.serve(message)
                 if tuning is not None:
-                    refusal = self._retune(tuning, handover)
-                    answer = refusal or self._tuner.accepted(self._thinker)
+                    answer = self._retune(tuning, handover) or answer
             self._requests.answer(address, answer)
 
     def _retune(self, tuning: Tuning, handover: Handover | None) -> dict[str, Any] | None:
         """Take another tuning; the refusal if it names what cannot be made."""
         former, cueing = self._thinker.tuning.algorithm, self._thinker.cueing
         try:
-            warm = self._sides.warm(tuning.algorithm)
-            self._thinker.retune(tuning, warm, self._tuner.taking_over())
+            self._thinker.retune(tuning, self._sides.warm(tuning.algorithm))
         except Exception as error:
             return self._tuner.take_back(f"{tuning.algorithm} cannot be made: {error}")
         if tuning.algorithm == former:

@@ -44,7 +44,7 @@ class PlannerOptions:
         machine: Geometry and hard limits.
         period: Planner period [s].
         send_period: Period of the platform's packets [s].
-        budget: How long before a send slot it wakes [s].
+        budget: How long before a send slot it wakes until it has measured its plans [s].
         arm: Driver's head from the point whose motion is sent, (3,) [m].
         inputs: The sources.
         tuning: Tunables at the start, in the units of the page.

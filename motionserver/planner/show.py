@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter, deque
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -138,6 +139,7 @@ class PlannerView:
         tuner: Tuner,
         measured: MeasuredForce,
         sides: Sides,
+        handover: Mapping[str, Any],
     ) -> bytes:
         """Write everything as JSON."""
         thought, gate = self._thought, inputs.vehicle
@@ -183,13 +185,14 @@ class PlannerView:
                 "status": "none" if report is None else report.solver_status,
                 **timing.summary(),
             },
+            "handover": handover,
             "reference": "" if report is None else report.reference,
             "kappa": None if proposal is None else proposal.kappa,
             "trouble": "" if thought is None else thought.trouble[:300],
             "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],
             "counters": self._counted(inputs, sides),
             "side": sides.shown(thinker.tuning.algorithm),
-            "tuning": tuner.shown(thinker),
+            "tuning": tuner.shown(),
             "tick": timing.lateness.summary(),
             "rates_hz": {"planner": round(self._rate, 2)},
         }

@@ -173,7 +173,8 @@ class CueingSection(Strict):
     budget_ms: Annotated[float, Field(ge=1.0, le=50.0)] = key(
         10.0,
         "How long before a packet the planner wakes to plan for it [ms], at most 0.8 of its "
-        "period. More is safer against slow solvers, less makes the cue younger.",
+        "period. It holds until the planner has measured how long its plans take, and follows "
+        "them.",
     )
     rate_max_hz: Annotated[float, Field(ge=20.0, le=200.0)] = key(
         120.0,

@@ -22,7 +22,6 @@ from motionserver.supervisor.standstill import Standstill
 from motionserver.telemetry.blackbox.room import make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
-from motionserver.telemetry.signals import PARKING
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
@@ -111,7 +110,7 @@ class Service:
             0 if the guard ended parked, 3 if it ended standing in a fault.
         """
         loop = asyncio.get_running_loop()
-        for number in PARKING:
+        for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self.leave)
         children = (*self.guards, self.planner, self.web, self.box)
         keepers = [asyncio.create_task(child.keep()) for child in children]

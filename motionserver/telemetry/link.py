@@ -10,24 +10,26 @@ from typing import Final
 from motionserver.core.motion.player import MOST_PENDING
 from motionserver.core.plan import MAX_KNOTS
 from motionserver.core.safety.states import State
+from motionserver.core.safety.verdict import Reason
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.trace import TRACE_BYTES
 
 STATES: Final = tuple(State)
-_CLOCK: Final = struct.Struct("<BQdQQQ")
+REASONS: Final = tuple(Reason)
+_CLOCK: Final = struct.Struct("<BQdQQQQQBBQ")
 _CUE: Final = struct.Struct("<QQBQQ")
 _TROUBLE_BYTES: Final = 300
 """Longest sentence about the source's packets [bytes of UTF-8]."""
-SENT: Final = struct.Struct("<QQ")
+SEQUENCE: Final = struct.Struct("<Q")
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 _WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
 
 @dataclass(frozen=True, slots=True)
 class GuardClock:
-    """What the planner must know of the guard, written at every send.
+    """What the planner must know of the guard, written at every send and every verdict.
 
     Attributes:
         state: Index of the motion state in `STATES`.
@@ -36,6 +38,11 @@ class GuardClock:
         sent_ns: When the last packet was sent [ns].
         due_ns: When the next one is due [ns].
         written_ns: When this was written [ns].
+        taken_id: Number of the newest proposal that was read; 0 = none.
+        judged_id: Number of the newest proposal that was decided about; 0 = none.
+        refusal: Why that one was refused, as 1 + its index in `REASONS`; 0 = accepted.
+        waiting: Accepted plans that wait for their instant.
+        late_count: Proposals that were refused as too late since the start.
     """
 
     state: int
@@ -44,6 +51,16 @@ class GuardClock:
     sent_ns: int
     due_ns: int
     written_ns: int
+    taken_id: int = 0
+    judged_id: int = 0
+    refusal: int = 0
+    waiting: int = 0
+    late_count: int = 0
+
+    @property
+    def refused_because(self) -> Reason | None:
+        """Why the newest proposal that was decided about was refused; None if it was not."""
+        return None if self.refusal == 0 else REASONS[self.refusal - 1]
 
     def pack(self) -> bytes:
         """Write as bytes."""
@@ -85,8 +102,7 @@ class Maps:
         clock: Guard to planner: `GuardClock`.
         cue: Planner to guard: the source's status.
         will: Guard to its successor: `core.safety.will.Will`, before every packet.
-        sent: Guard to its successor: sequence of the will whose packet went out, and when it had
-            gone out at the latest, right after it.
+        sent: Guard to its successor: sequence of the will whose packet went out, right after it.
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
@@ -103,7 +119,7 @@ class Maps:
         self.clock = opened("clock", _CLOCK.size)
         self.cue = opened("cue", _CUE.size + _TROUBLE_BYTES)
         self.will = opened("will", _WILL_BYTES)
-        self.sent = opened("sent", SENT.size)
+        self.sent = opened("sent", SEQUENCE.size)
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)

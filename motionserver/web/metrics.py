@@ -24,6 +24,19 @@ _SINGLES: Final = (
     ("guard", ("plan", "kappa"), "plan_kappa", "Share of the candidate in the plan played."),
     ("planner", ("source", "age_s"), "input_age_seconds", "Age of the newest cue."),
     ("planner", ("tuning", "version"), "tuning_version", "Version of the tuning in force."),
+    (
+        "planner",
+        ("handover", "lead_slots"),
+        "handover_lead_slots",
+        "Send slots added because plans came too late.",
+    ),
+    ("planner", ("handover", "waiting"), "plans_waiting", "Accepted plans that wait to be played."),
+    (
+        "planner",
+        ("handover", "ahead_ms"),
+        "plan_ahead_milliseconds",
+        "How long before its send slot a plan is begun.",
+    ),
     ("planner", ("solver", "iterations"), "solver_iterations", "Iterations of the last step."),
 )
 _ENGINE: Final = (

@@ -204,6 +204,8 @@ class Scene:
             "reference": "ar",
             "solver": {"backend": self.book.model.backend, "time_p50_ms": 1.3,
                        "time_p99_ms": 2.4, "last_ms": 1.2, "iterations": 27, "status": "solved"},
+            "handover": {"lead_slots": 1, "ahead_ms": 9.4, "waiting": 2,
+                         "last_refusal": "too-late", "periods_waited": 0},
             "kappa": 1.0,
             "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0, "plans_halved": 41,
                          "plans_refused": 3},

@@ -64,10 +64,10 @@ def link(data):
     try:
         clock = GuardClock.unpack(data)
     except struct.error:
-        must(len(data) != 41, "told too little")
+        must(len(data) != 67, "told too little")
         clock = None
     if clock is not None:
-        assert len(data) == 41
+        assert len(data) == 67
         assert clock.pack() == data, "written again it differs"
     return status is not None or clock is not None
 

@@ -10,8 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from motionserver.core.motion.player import Playback
 from motionserver.core.plan import pack, rest_at
+from motionserver.core.safety.accept import accept_rest
 from motionserver.core.safety.given import GuardConfig
+from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.verdict import AcceptedPlan, Reason
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
 from motionserver.guard import ports
@@ -19,7 +23,7 @@ from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import DRAIN, Ports, open_link
 from motionserver.platforms.base import PlatformOptions
 from motionserver.settings.machine import load_machine
-from motionserver.telemetry.link import Maps, pack_cue, unpack_cue
+from motionserver.telemetry.link import GuardClock, Maps, pack_cue, unpack_cue
 from motionserver.telemetry.sieve import unsieve
 
 SLOT = struct.Struct("<QII")
@@ -168,6 +172,43 @@ def test_proposals_are_read_once_and_nonsense_is_rejected(scene: Scene) -> None:
         scene.maps.proposal.write(nonsense)
         assert scene.ports.proposal() is None
     assert scene.counters["rejected_malformed"] == scene.counters["plans_rejected"] == 3
+
+
+def told(scene: Scene) -> GuardClock:
+    message = scene.maps.clock.read()
+    assert message is not None
+    return GuardClock.unpack(message[1])
+
+
+def test_what_was_decided_about_a_plan_is_told_once_with_its_reason(scene: Scene) -> None:
+    record = GuardRecord()
+    assert not scene.ports.has_news(record)
+    scene.maps.proposal.write(pack(rest_at(np.zeros(6), 9)))
+    scene.ports.proposal()
+    assert scene.ports.has_news(record)
+    scene.ports.publish(1, 2, 3, record)
+    assert not scene.ports.has_news(record)
+    assert (told(scene).taken_id, told(scene).judged_id) == (9, 0)
+    for number, why in enumerate(Reason, 10):
+        record.judged_id, record.refusal = number, why
+        record.counters[f"rejected_{why}"] += 1
+        assert scene.ports.has_news(record)
+        scene.ports.publish(1, 2, 3, record)
+        assert not scene.ports.has_news(record)
+        assert (told(scene).judged_id, told(scene).refused_because) == (number, why)
+    assert told(scene).late_count == 1
+    record.judged_id, record.refusal = 99, None
+    scene.ports.publish(1, 2, 3, record)
+    assert (told(scene).judged_id, told(scene).refused_because) == (99, None)
+
+
+def test_it_is_told_how_many_plans_wait(scene: Scene) -> None:
+    machine = scene.options.guard.machine
+    accepted = accept_rest(machine, np.zeros(6), 5, machine.parked_pose[None])
+    assert isinstance(accepted, AcceptedPlan)
+    record = GuardRecord(playback=Playback(accepted, 0.0, (accepted, accepted)))
+    scene.ports.publish(1, 2, 3, record)
+    assert told(scene).waiting == 2
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -1,16 +1,20 @@
 """Where the next plan takes over: the guard's clock, and what is learnt from missing it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from motionserver.core.axes import frozen
+from motionserver.core.motion.player import MOST_PENDING
 from motionserver.core.plan import Plan, pack, rest_at
 from motionserver.core.safety.states import State
+from motionserver.core.safety.verdict import Reason
 from motionserver.core.safety.verify import CLOSEST
-from motionserver.planner.handover import ALIVE_NS, CONFIDENCE, KEPT, MOST_LEAD, HandoverClock
-from motionserver.telemetry.link import STATES, GuardClock, Maps
+from motionserver.planner.handover import ALIVE_NS, FALL_NS, KEPT, Handover, HandoverClock
+from motionserver.planner.open_proposals import READ_NS
+from motionserver.telemetry.link import REASONS, STATES, GuardClock, Maps
 
 MS = 1_000_000
 PERIOD = 1 / 60
@@ -20,12 +24,40 @@ class Scene:
     def __init__(self, folder: Path) -> None:
         self.maps = Maps(folder, create=True)
         self.clock = HandoverClock(self.maps, PERIOD)
+        self.late = 0
 
-    def guard(self, state: State, newest: Plan, at: float = 0.0, now: int = 0) -> None:
+    def guard(
+        self,
+        state: State,
+        newest: Plan,
+        at: float = 0.0,
+        now: int = 0,
+        judged: int = 0,
+        why: Reason | None = None,
+        taken: int = 0,
+    ) -> None:
+        self.late += why is Reason.TOO_LATE
         self.maps.accepted.write(pack(newest))
         due = now + int(PERIOD * 1e9)
-        clock = GuardClock(STATES.index(state), newest.plan_id, at, now, due, now)
+        code = 0 if why is None else 1 + REASONS.index(why)
+        clock = GuardClock(
+            STATES.index(state),
+            newest.plan_id,
+            at,
+            now,
+            due,
+            now,
+            taken,
+            judged,
+            code,
+            0,
+            self.late,
+        )
         self.maps.clock.write(clock.pack())
+
+    def handover(self, now: int = 0, ready: int = 0) -> Handover | None:
+        self.clock.read(now)
+        return self.clock.handover(now, ready)
 
 
 @pytest.fixture
@@ -103,25 +135,148 @@ def test_a_plan_that_cannot_be_read_yet_is_waited_for(scene: Scene) -> None:
     assert scene.clock.handover(0, 0) is None
 
 
-def test_missing_aims_further_and_meeting_long_aims_nearer(scene: Scene) -> None:
-    parent = rest_at(np.zeros(6), 5)
-    scene.guard(State.RUN, parent)
-    scene.clock.read(0)
-    scene.clock.handover(0, 0)
+OURS = 100
+
+
+def refused(scene: Scene, why: Reason, count: int) -> None:
+    """The guard has refused so many proposals, one a period."""
+    for k in range(count):
+        scene.clock.proposed(plan(OURS + k, 5), k * MS)
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), judged=OURS + k, why=why)
+        scene.handover(k * MS)
+
+
+def test_a_plan_too_late_aims_further_but_never_as_far_as_the_guard_lets_plans_wait(
+    scene: Scene,
+) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, Reason.TOO_LATE, 8)
+    assert scene.clock.last_refusal is Reason.TOO_LATE
+    for ready_ms in (0, 17, 34, 200):
+        found = scene.handover(0, ready_ms * MS)
+        assert found is not None
+        assert found.takeover < MOST_PENDING * PERIOD
+
+
+@pytest.mark.parametrize("why", [one for one in Reason if one is not Reason.TOO_LATE])
+def test_a_plan_refused_for_another_reason_is_no_late_plan(scene: Scene, why: Reason) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, why, 8)
     assert scene.clock.lead == 0
-    scene.clock.proposed(plan(6, 5))
-    for k in range(6):
-        scene.clock.handover(0, 0)
-        assert scene.clock.lead == min(k + 1, MOST_LEAD)
-    scene.guard(State.RUN, plan(6, 5), at=0.5)
-    scene.clock.read(0)
-    for _ in range(CONFIDENCE):
-        scene.clock.handover(0, 0)
-    assert scene.clock.lead == MOST_LEAD
-    found = scene.clock.handover(0, 0)
-    assert scene.clock.lead == MOST_LEAD - 1
+    assert scene.clock.shown()["last_refusal"] == why
+
+
+def test_the_lead_falls_by_time_whatever_else_is_refused(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, Reason.TOO_LATE, 2)
+    assert scene.clock.lead == 2
+    for k in range(1, 8):
+        now = MS + k * FALL_NS // 4
+        why = Reason.TOO_EARLY if k % 2 else Reason.WRONG_PARENT
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), now=now, judged=200 + k, why=why)
+        scene.handover(now)
+        assert scene.clock.lead == (2 if k < 4 else 1)
+
+
+def test_a_guard_that_counts_anew_is_no_late_plan(scene: Scene) -> None:
+    scene.late = 7
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    assert scene.clock.lead == 0
+    scene.late = 0
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    assert scene.clock.lead == 0
+    refused(scene, Reason.TOO_LATE, 1)
+    assert scene.clock.lead == 1
+
+
+def test_a_slot_reached_by_adding_periods_is_not_missed_by_rounding(scene: Scene) -> None:
+    # the guard adds its period at every send: what it has then must not lie past the instant
+    at = 0.4
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=at)
+    found = scene.handover(0, 33 * MS)
     assert found is not None
-    assert found.takeover == pytest.approx(0.5 + (MOST_LEAD - 1) * PERIOD)
+    assert found.takeover >= at + PERIOD
+
+
+def in_time(plan_id: int, parent: int, takeover: float) -> Plan:
+    return replace(plan(plan_id, parent), takeover=takeover)
+
+
+def test_a_proposal_without_a_verdict_is_continued_if_it_is_in_time(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.4 + PERIOD), 0)
+    found = scene.handover(1 * MS, 1 * MS)
+    assert found is not None
+    assert (found.parent.plan_id, found.before and found.before.plan_id) == (6, 5)
+    # it waits a period for its own instant: two periods of it are those after the next send
+    found = scene.handover(1 * MS, 20 * MS)
+    assert found is not None
+    assert found.takeover == pytest.approx(CLOSEST)
+
+
+def test_a_proposal_that_will_come_too_late_is_not_continued(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.4 - PERIOD), 0)
+    found = scene.handover(1 * MS)
+    assert found is not None
+    assert found.parent.plan_id == 5
+
+
+def test_a_refused_proposal_is_not_continued_and_neither_is_its_child(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.4 + PERIOD), 0)
+    scene.clock.proposed(in_time(7, 6, 0.02), 1 * MS)
+    scene.guard(
+        State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=2 * MS, judged=6, why=Reason.LEG_JERK
+    )
+    found = scene.handover(2 * MS)
+    assert found is not None
+    assert found.parent.plan_id == 5
+
+
+def test_two_proposals_without_a_verdict_are_waited_for(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.4 + PERIOD), 0)
+    scene.clock.proposed(in_time(7, 6, 0.02), 1 * MS)
+    assert scene.handover(2 * MS) is None
+    assert scene.clock.waited == 1
+    scene.guard(State.RUN, in_time(6, 5, 0.4 + PERIOD), at=-PERIOD, now=3 * MS, judged=6)
+    found = scene.handover(3 * MS)
+    assert found is not None
+    assert found.parent.plan_id == 7
+
+
+def test_a_proposal_that_nobody_will_decide_about_is_given_up(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.5), 0)
+    for now, parent in ((16 * MS, 6), (17 * MS, 5)):
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=now)
+        found = scene.handover(now)
+        assert found is not None
+        assert found.parent.plan_id == parent
+
+
+def test_a_plan_is_held_back_while_it_would_replace_its_own_parent(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 5, 0.5), 0)
+    child = in_time(7, 6, 0.02)
+    assert not scene.clock.may_propose(child, READ_NS - 1)
+    # a guard that ticks has read it by then
+    assert scene.clock.may_propose(child, READ_NS)
+    assert scene.clock.may_propose(in_time(7, 5, 0.5), 0)
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, taken=6)
+    assert scene.clock.may_propose(child, 0)
 
 
 def test_only_the_newest_proposals_are_remembered(scene: Scene) -> None:

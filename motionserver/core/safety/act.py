@@ -128,6 +128,10 @@ class Guard:
                 verdict = accept_proposal(
                     self.machine, given.proposal, playback.newest, playback.newest_clock, self.homes
                 )
+        if verdict is not None:
+            assert self.judged is not None
+            record.judged_id = self.judged.plan_id
+            record.refusal = verdict.reason if isinstance(verdict, Rejection) else None
         if isinstance(verdict, Rejection):
             record.counters["plans_rejected"] += 1
             record.counters[f"rejected_{verdict.reason}"] += 1

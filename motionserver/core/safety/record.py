@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.states import State
-from motionserver.core.safety.verdict import Rejection
+from motionserver.core.safety.verdict import Reason, Rejection
 
 
 @dataclass(slots=True)
@@ -21,6 +21,8 @@ class GuardRecord:
         playback: What is played; None while nothing is.
         deadline_ns: When raising or parking has taken too long [ns].
         accepted_ns: When the last proposal was accepted [ns].
+        judged_id: Number of the newest proposal that was decided about; 0 = none.
+        refusal: Why that one was refused; None if it was accepted.
         reset_until_ns: Until when a reset is being tried [ns].
         leaving: True once the service is to end: park, and engage no more.
         engaged_once: True once "auto" has used its single edge.
@@ -36,6 +38,8 @@ class GuardRecord:
     playback: Playback | None = None
     deadline_ns: int = 0
     accepted_ns: int = 0
+    judged_id: int = 0
+    refusal: Reason | None = None
     reset_until_ns: int = 0
     leaving: bool = False
     engaged_once: bool = False

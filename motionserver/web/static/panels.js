@@ -56,9 +56,11 @@ function pose(values) {
   });
 }
 
+const slots = (count) => `${fixed(count, 0)} ${count === 1 ? "slot" : "slots"}`;
+
 export function showNumbers(status) {
   const g = status.guard || {}, p = status.planner || {};
-  const source = p.source || {}, solver = p.solver || {}, tick = g.tick || {}, feedback = g.feedback || {};
+  const source = p.source || {}, solver = p.solver || {}, handover = p.handover || {}, tick = g.tick || {}, feedback = g.feedback || {};
   const ms = (seconds) => (isNumber(seconds) ? fixed(Math.max(0, 1e3 * seconds), 1, "ms") : "–");
   rows(byId("numbers"), [
     ["Source", source.address ? `${source.kind} ${source.address}` : "none", source.address && !source.fresh],
@@ -74,6 +76,8 @@ export function showNumbers(status) {
     ["Solver", `${solver.backend || "–"}, ${solver.status || "–"}, ${fixed(solver.iterations, 0)} it.`],
     ["Forecast", p.reference || "–"],
     ["Tick late max, missed", `${fixed(tick.late_max_ms, 1)} ms, ${fixed(tick.missed, 0)}`, tick.missed > 0],
+    ["Plans begun ahead, lead", isNumber(handover.ahead_ms) ? `${fixed(handover.ahead_ms, 1, "ms")}, ${slots(handover.lead_slots)}` : "–"],
+    ["Plans waiting, last refusal", isNumber(handover.waiting) ? `${fixed(handover.waiting, 0)}, ${String(handover.last_refusal || "none").replaceAll("-", " ")}` : "–"],
     ["Plan share κ", fixed(p.kappa ?? g.plan?.kappa, 3)],
     ["Tracking error", isNumber(g.tracking_error) ? fixed(1e3 * g.tracking_error, 2, "mm") : "–"],
     ["Plans halved, refused", `${fixed(p.counters?.plans_halved ?? 0, 0)}, ${fixed(p.counters?.plans_refused ?? 0, 0)}`],

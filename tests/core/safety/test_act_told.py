@@ -119,6 +119,7 @@ def test_an_accepted_proposal_follows_and_is_counted_with_its_instant():
     assert scene.record.accepted_ns == scene.now
     assert scene.record.counters["plans_accepted"] == 1
     assert scene.record.counters["plans_rejected"] == 0
+    assert (scene.record.judged_id, scene.record.refusal) == (plan.plan_id, None)
     scene.tick()
     assert scene.guard.judged is None
 
@@ -134,6 +135,7 @@ def test_a_rejected_proposal_is_counted_and_kept_with_its_reason():
     assert scene.record.counters["plans_accepted"] == 0
     assert scene.record.counters["plans_rejected"] == 1
     assert scene.record.counters["rejected_wrong-parent"] == 1
+    assert (scene.record.judged_id, scene.record.refusal) == (7, Reason.WRONG_PARENT)
     (when, why) = scene.record.rejections[-1]
     assert (when, why.reason) == (scene.now, Reason.WRONG_PARENT)
 
