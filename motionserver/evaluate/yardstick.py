@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -15,6 +13,7 @@ from motionserver.evaluate.drive import RATE_HZ, Drive
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import rmse_xy
 from motionserver.evaluate.recording import Recording
+from motionserver.evaluate.worker_pool import worker_pool
 
 COARSE: Final = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Gains tried first."""
@@ -90,8 +89,7 @@ def find_yardstick(
 def _all(run: Callable[[float], Drive], gains: tuple[float, ...], jobs: int) -> list[Drive]:
     if jobs <= 1 or len(gains) < 2:
         return [run(gain) for gain in gains]
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(gains)), context) as pool:
+    with worker_pool(min(jobs, len(gains))) as pool:
         return list(pool.map(run, gains))
 
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-import signal
 from dataclasses import replace
 
 import numpy as np
@@ -191,15 +190,6 @@ def test_a_drive_without_force_is_refused(tmp_path):
     silent = from_samples("silent", times, force, np.zeros((300, 3)), np.zeros(300))
     with pytest.raises(ConfigError, match=r"recording silent.*next to no horizontal force"):
         tune([silent, DRIVES[0]], out=tmp_path, **ASKED)
-
-
-def test_a_stop_from_the_keyboard_is_left_to_the_parent():
-    asked = signal.getsignal(signal.SIGINT)
-    try:
-        driving._leave_ctrl_c()
-        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, asked)
 
 
 @pytest.mark.parametrize(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
@@ -21,6 +20,7 @@ from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.recording import read_recording
+from motionserver.evaluate.worker_pool import worker_pool
 from motionserver.evaluate.yardstick import find_yardstick
 
 CURVE_HZ: Final = 20.0
@@ -66,8 +66,7 @@ def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Re
         for index in missing:
             take(index, *_guarded(tasks[index], files[index]))
         return results
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(missing)), context) as pool:
+    with worker_pool(min(jobs, len(missing))) as pool:
         # the searches take longest: first, so that no core waits for them in the end
         order = sorted(missing, key=lambda index: tasks[index].contender.way != "")
         futures = {pool.submit(_guarded, tasks[index], files[index]): index for index in order}

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from math import degrees, radians
@@ -28,6 +26,7 @@ from motionserver.evaluate.omct.sines import (
     tilt_shown,
     to_recording,
 )
+from motionserver.evaluate.worker_pool import worker_pool
 
 PLANNER_HZ: Final = 50.0
 """Planner rate unless told otherwise [Hz]."""
@@ -150,8 +149,7 @@ def run_omct(
         for task in tasks:
             take(task, work(task))
     else:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(min(jobs, len(tasks)), context) as pool:
+        with worker_pool(min(jobs, len(tasks))) as pool:
             for task, answer in zip(tasks, pool.map(work, tasks), strict=True):
                 take(task, answer)
     responses = tuple(

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
-from typing import Final
+from concurrent.futures import as_completed
 
 from motionserver.evaluate.tune.cache import ResultCache, key_of
 from motionserver.evaluate.tune.outcome import Job, Outcome, run
+from motionserver.evaluate.worker_pool import worker_pool
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, drives done, drives in all."""
-_THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def drive_all(
@@ -55,31 +50,7 @@ def _run(jobs: dict[str, Job], processes: int) -> Iterator[tuple[str, Outcome]]:
         for key, job in jobs.items():
             yield key, run(job)
         return
-    context = multiprocessing.get_context("spawn")
-    count = min(processes, len(jobs))
-    with _one_thread_each(), ProcessPoolExecutor(count, context, _leave_ctrl_c) as pool:
+    with worker_pool(min(processes, len(jobs))) as pool:
         keys = {pool.submit(run, job): key for key, job in jobs.items()}
-        try:
-            for future in as_completed(keys):
-                yield keys[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let children inherit it: a second thread for such small matrices tripled their time."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update({name: "1" for name in _THREADS if before[name] is None})
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-
-
-def _leave_ctrl_c() -> None:
-    """The parent is told as well, and ends the children in order."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        for future in as_completed(keys):
+            yield keys[future], future.result()
