@@ -17,8 +17,8 @@ from motionserver.supervisor.addresses import claim_platform, open_link, try_add
 from motionserver.supervisor.child import Child
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
 from motionserver.supervisor.rundir import clean, take
+from motionserver.supervisor.standstill import IDLE, Standstill, activity_of
 from motionserver.supervisor.standstill import POLL as LOOK
-from motionserver.supervisor.standstill import Standstill
 from motionserver.telemetry.blackbox.room import make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
@@ -215,9 +215,17 @@ class Service:
         )
         while True:
             for child, shown, standstill in watched:
-                if standstill.look(loop.time(), child.pid, shown.newest_sequence()):
-                    log.error("the %s stands still; killed, another is started", child.name)
+                activity = IDLE if child.pid is None else activity_of(child.pid)
+                patience, sign = standstill.patience, shown.newest_sequence()
+                if standstill.look(loop.time(), child.pid, sign, activity):
+                    log.error(
+                        "the %s stands still; killed, another is started (no report for %.0f s)",
+                        child.name,
+                        patience,
+                    )
                     child.signal(signal.SIGKILL)
+                elif said := standstill.still_loading():
+                    log.info("the %s %s", child.name, said)
             await asyncio.sleep(LOOK)
 
     async def _tell_manager(self) -> None:
