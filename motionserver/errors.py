@@ -2,6 +2,7 @@
 
 MotionServerError
     ConfigError                a file or key a person must mend
+    TunableError               a value of a tunable with which no algorithm can be made here
     PluginError                a plug-in that does not load
     PlatformPacketError        bytes on the platform's port that are no answer (platforms.base)
     SourceError                bytes of a simulator that are no sample (sources.base)
@@ -30,6 +31,22 @@ class ConfigError(MotionServerError):
         self.where = where
         self.what = what
         self.do = do
+
+
+class TunableError(MotionServerError, ValueError):
+    """With this value of a tunable the algorithm cannot be made here.
+
+    Attributes:
+        tunable: Its name in the tuning.
+        what: What is wrong.
+        allowed: What can be used instead.
+    """
+
+    def __init__(self, tunable: str, what: str, allowed: str) -> None:
+        super().__init__(f"{what}; allowed: {allowed}; change tuning.{tunable}")
+        self.tunable = tunable
+        self.what = what
+        self.allowed = allowed
 
 
 class PluginError(MotionServerError):

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from .arrival_stamps import StampingSocket, bound_socket
 from .flawed_link import FlawedLink, LinkFlaws
 from .force_sender import ForceSender
 from .moog_config import MoogConfig
@@ -28,6 +29,13 @@ Mishap = tuple[float, Callable[[MoogDevice], None]]
 
 DEFAULT_PORT = 991
 """UDP port of the real base; binding it takes privileges."""
+
+ENDING = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+    if hasattr(signal, name)
+)
+"""What switches a base off that runs by itself; its verdict is written."""
 
 _TICK = 0.005  # [s], how often the base is advanced while nothing arrives
 
@@ -89,6 +97,7 @@ class Emulator(asyncio.DatagramProtocol):
         self._hosts: set[Address] = set()
         self._replies = 0
         self._transport: asyncio.DatagramTransport | None = None
+        self._socket: StampingSocket | None = None
         self._ticking: asyncio.Task[None] | None = None
 
     @property
@@ -109,9 +118,10 @@ class Emulator(asyncio.DatagramProtocol):
             OSError: The address cannot be bound.
         """
         loop = asyncio.get_running_loop()
-        self._transport, _ = await loop.create_datagram_endpoint(
-            lambda: self, local_addr=self._listen
-        )
+        self._socket = bound_socket(self._listen)
+        if not self._socket.is_stamping:
+            self.judge.trust_no_instants()
+        self._transport, _ = await loop.create_datagram_endpoint(lambda: self, sock=self._socket)
         self.device.advance(time.monotonic())
         self._ticking = asyncio.create_task(self._tick(time.monotonic()))
         return self.address
@@ -125,7 +135,7 @@ class Emulator(asyncio.DatagramProtocol):
             self._ticking = None
         if self._transport is not None:
             self._transport.close()
-            self._transport = None
+            self._transport = self._socket = None
             await asyncio.sleep(0)  # asyncio closes the socket on its next turn
 
     async def __aenter__(self) -> Self:
@@ -154,13 +164,13 @@ class Emulator(asyncio.DatagramProtocol):
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
         """Take one datagram off the socket."""
-        now_ns = time.monotonic_ns()
-        now = now_ns * 1e-9
+        now = time.monotonic()
+        arrived_ns = time.monotonic_ns() if self._socket is None else self._socket.arrived_ns
         if self._log is not None:
-            self._log.write(now_ns, data)
+            self._log.write(arrived_ns, data)
         self._hosts.add(addr[:2])
         self.device.advance(now)
-        self.judge.observe(data, now, self.device)
+        self.judge.observe(data, arrived_ns * 1e-9, self.device)
         for arrival in self.to_base.carry(now, data):
             self._after(arrival.delay, partial(self._deliver, arrival.datagram, addr))
 
@@ -214,7 +224,7 @@ def run_emulator(
     seed: int = 0,
     on_ready: Callable[[Address], None] | None = None,
 ) -> dict[str, object]:
-    """Run a base until SIGINT or SIGTERM, or for ``duration`` seconds.
+    """Run a base until one of :data:`ENDING`, or for ``duration`` seconds.
 
     Args:
         listen_host: Address to bind.
@@ -244,7 +254,7 @@ def run_emulator(
     async def run(log: MotionLog, send_force: SendForce | None) -> dict[str, object]:
         done = asyncio.Event()
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDING:
             loop.add_signal_handler(number, done.set)
         emulator = Emulator(
             config,

@@ -1,21 +1,24 @@
 """Judges what a host sends to a Moog base, before the base's own limiter can make it harmless.
 
 Commands are taken in the order sent, one nominal period apart: a plan whose clock pauses is no
-offence, a setpoint that jumps over a gap is. Where the wire may lose commands, a gap may hide as
-many as fit into it, and the number that offends least is believed. Differences are taken within a
-stretch of NEW_POSITION; a stretch that an engaged base obeys begins at rest, where the base stands.
+offence, a setpoint that jumps over a gap is. :mod:`.moog_wall_time` judges the instants of arrival.
+Where the wire may lose commands, a gap may hide as many as fit into it, and the number that offends
+least is believed. Differences are taken within a stretch of NEW_POSITION; a stretch that an engaged
+base obeys begins at rest, where the base stands.
 """
 
 from __future__ import annotations
 
 from array import array
 from collections import Counter, deque
+from dataclasses import replace
 from math import isfinite
 
 from .divided_differences import likeliest_slots, rates
 from .hexapod_legs import Six
 from .moog_config import MoogConfig
 from .moog_judged import JudgedLimits, SeenDevice
+from .moog_wall_time import WallTimeMonitor
 from .moog_wire import (
     COMMAND_SIZE,
     CommandMode,
@@ -56,6 +59,7 @@ class MoogJudge:
         self._largest: dict[str, list[float]] = {
             kind: [0.0] * 6 for kind in ("step", "speed", "acceleration", "jerk")
         }
+        self._wall_time = WallTimeMonitor(self._limits)
         self._gap_jump = 0.0
         self._details: list[dict[str, object]] = []
         self._history: deque[Six] = deque(maxlen=3)
@@ -66,15 +70,22 @@ class MoogJudge:
         self._first: float | None = None
         self._last = 0.0
 
+    def trust_no_instants(self) -> None:
+        """Record spacing and speed in wall time without judging them."""
+        self._wall_time.limits = replace(self._limits, in_wall_time=False)
+
     @property
     def violations(self) -> int:
         """Offences counted so far."""
         return (
-            sum(map(sum, self._legs.values())) + self._counts["range"] + self._counts["not_finite"]
+            sum(map(sum, self._legs.values()))
+            + self._counts["range"]
+            + self._counts["not_finite"]
+            + self._wall_time.violations
         )
 
     def observe(self, datagram: bytes, now: float, device: SeenDevice) -> None:
-        """See one datagram at ``now`` [s], before ``device``, advanced to then, receives it."""
+        """See one datagram that arrived at ``now`` [s], before ``device`` receives it."""
         self._counts["total"] += 1
         if len(datagram) != COMMAND_SIZE:
             self._counts["wrong_size"] += 1
@@ -98,7 +109,7 @@ class MoogJudge:
         ``violations`` is the number of offences, ``ended_safe`` whether the base is parked, or
         faulted and at rest. Legs count from front left counter-clockwise, SI unless suffixed.
         """
-        gaps = sorted(self._gaps)
+        gaps, wall_time = sorted(self._gaps), self._wall_time
         duration = self._last - self._first if self._first is not None else 0.0
         states: list[str] = []
         for _, state in device.transitions:
@@ -110,8 +121,13 @@ class MoogJudge:
                 "range": self._counts["range"],
                 "not_finite": self._counts["not_finite"],
                 **{kind: sum(legs) for kind, legs in self._legs.items()},
+                "spacing": wall_time.hidden_steps,
+                "wall_speed": sum(wall_time.too_fast),
             },
-            "violations_by_leg": {kind: list(legs) for kind, legs in self._legs.items()},
+            "violations_by_leg": {
+                **{kind: list(legs) for kind, legs in self._legs.items()},
+                "wall_speed": list(wall_time.too_fast),
+            },
             "first_violations": list(self._details),
             "ended_safe": device.is_parked or (device.state in _FAULTED and device.is_at_rest),
             "state": device.state.name,
@@ -129,6 +145,10 @@ class MoogJudge:
                 name: 1e3 * gaps[min(len(gaps) - 1, int(share * len(gaps)))] if gaps else 0.0
                 for name, share in (("p50", 0.5), ("p99", 0.99), ("p99_9", 0.999), ("max", 1.0))
             },
+            "spacing_min_ms": None if wall_time.spacing is None else 1e3 * wall_time.spacing,
+            "commands_too_close": wall_time.too_close,
+            "wall_speed_max": max(wall_time.speeds),
+            "judged_in_wall_time": wall_time.is_judging,
             "gap_jump_max_mm": 1e3 * self._gap_jump,
             "step_max_mm": 1e3 * max(self._largest["step"]),
             "speed_max": max(self._largest["speed"]),
@@ -144,6 +164,7 @@ class MoogJudge:
         else:
             gap = now - self._last
             self._gaps.append(gap)
+            self._wall_time.on_arrival(gap)
         self._last = now
         return gap
 
@@ -176,6 +197,8 @@ class MoogJudge:
             step = max(abs(b - a) for a, b in zip(self._history[-1], legs, strict=True))
             if gap > 1.5 * self._limits.period:
                 self._gap_jump = max(self._gap_jump, step)
+            for offence in self._wall_time.on_step(gap, self._history[-1], legs):
+                self._note(now, *offence)
         self._slots.append(self._slots_in(gap, legs))
         for leg, extension in enumerate(legs):
             self._difference(leg, extension, now)

@@ -53,7 +53,12 @@ class JudgedLimits:
         acceleration: Leg acceleration [m/s²].
         jerk: Leg jerk [m/s³]; None records it without judging.
         period: Nominal time between two commands [s].
-        may_lose: Whether the wire loses commands, so that a gap excuses a step of that long.
+        may_lose: Whether the wire loses commands, so that a gap excuses a step of that long, and
+            delays them, so that their spacing is not the sender's.
+        spacing: Least time between two commands, as a share of ``period``.
+        wall_speed: Leg speed in wall time, as a multiple of ``speed``.
+        in_wall_time: Whether the instants of arrival are exact enough to be judged; else they are
+            only recorded.
     """
 
     speed: float = 0.6
@@ -61,3 +66,6 @@ class JudgedLimits:
     jerk: float | None = None
     period: float = 1 / 60
     may_lose: bool = False
+    spacing: float = 0.8
+    wall_speed: float = 1.25
+    in_wall_time: bool = True

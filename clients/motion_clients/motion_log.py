@@ -15,8 +15,8 @@ _KEPT = 100_000
 class MotionLog:
     """Received datagrams with their instants, in memory and, if wanted, in a text file.
 
-    A line of the file is ``<monotonic instant in ns> <bytes in hex>``; :func:`read_motion_log`
-    reads it back.
+    Instants are those of arrival, by the kernel's stamp where there is one. A line of the file is
+    ``<monotonic instant in ns> <bytes in hex>``; :func:`read_motion_log` reads it back.
 
     Attributes:
         records: The newest records: instant (CLOCK_MONOTONIC, ns) and datagram.

@@ -27,6 +27,7 @@ from motionserver.settings.config import load_config
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.requests import RequestError, ask
+from motionserver.telemetry.signals import PARKING, ignore_signals
 
 PAGE_PORT: Final = 8080
 FAULT_AFTER: Final = 12.0
@@ -67,6 +68,7 @@ class Demo:
 
     def run(self) -> int:
         """Run it; 0 only if the base saw no violation and ended safe."""
+        ignore_signals(but=PARKING)
         logging.basicConfig(level=logging.WARNING, format="%(message)s")
         with tempfile.TemporaryDirectory(prefix="motionserver-demo-") as folder:
             return asyncio.run(self._main(Path(folder)))
@@ -234,7 +236,7 @@ def _read(source: MappedFile) -> dict[str, Any] | None:
 
 
 def say(text: str) -> None:
-    """Print a line at once, also into a pipe."""
-    with contextlib.suppress(BrokenPipeError):
+    """Print a line at once, also into a pipe; a terminal that has closed ends nothing."""
+    with contextlib.suppress(OSError):
         sys.stdout.write(text + os.linesep)
         sys.stdout.flush()

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from motion_clients.flawed_link import LinkFlaws
-from motion_clients.moog_emulator import run_emulator
+from motion_clients.moog_emulator import ENDING, run_emulator
 from motion_clients.moog_judged import JudgedLimits
 from motion_clients.recording import RecordingError, recording_names, recording_path
 from motion_clients.replay import FORMATS
@@ -18,6 +18,7 @@ from motionserver.errors import ConfigError
 from motionserver.evaluate.files import check_file
 from motionserver.settings.config import split_address
 from motionserver.telemetry.realtime import take_priority
+from motionserver.telemetry.signals import ignore_signals
 
 PUNCTUAL = 20
 """Real-time priority to ask for: a base and a simulator are punctual, an emulated one must be."""
@@ -49,6 +50,7 @@ def emulate(
     to = _address("--force-to", force_to) if force_to else None
     check_file("--summary", summary)
     check_file("--log", log)
+    ignore_signals(but=ENDING)
     take_priority(PUNCTUAL, wanted=True)
     cut = LinkFlaws()
     if cut_after is not None:

@@ -21,6 +21,7 @@ from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.requests import RequestError, ask
+from motionserver.telemetry.signals import PARKING, ignore_signals
 from motionserver.telemetry.ticker import now_ns
 from motionserver.web.config import config_from
 
@@ -31,6 +32,7 @@ class NotRunningError(MotionServerError):
 
 def serve(path: Path, dry_run: bool) -> int:
     """Run a server until a signal; returns its exit status."""
+    ignore_signals(but=PARKING)
     config = load_config(path)
     logging.basicConfig(
         level=config.server.log_level.upper(), format="%(asctime)s %(name)s %(message)s"

@@ -70,6 +70,8 @@ class VehicleMotion:
         preview: What comes next, if the sender knows.
         driver: What the driver does, if the sender tells.
         sim_time_ns: The simulation's own time of the values [ns]; 0 if its format has none.
+        attitude: Roll and pitch that the sender tells [rad], or None if it tells none.
+        speed_known: True if the sender tells the speed.
     """
 
     arrival_ns: int
@@ -84,6 +86,8 @@ class VehicleMotion:
     preview: Preview | None = None
     driver: Driver | None = None
     sim_time_ns: int = 0
+    attitude: tuple[float, float] | None = None
+    speed_known: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from motionserver.core.axes import Array
 from motionserver.core.plan import Plan
@@ -89,9 +89,26 @@ class Cueing(Protocol):
         ...
 
     def retune(self, tuning: Tuning) -> None:
-        """Take other tunables; motion stays continuous because plans are."""
+        """Take other tunables; motion stays continuous because plans are.
+
+        Raises:
+            ValueError: It cannot be made with these; then nothing has changed.
+        """
         ...
 
     def report(self) -> Report:
         """Tell about the last step."""
+        ...
+
+
+@runtime_checkable
+class ReadsBack(Protocol):
+    """A cueing algorithm that tells which tunables it works with now.
+
+    Who does not is taken at its word: what its `Cueing.retune` took without an error is in force.
+    """
+
+    @property
+    def tuning(self) -> Tuning:
+        """Tunables in force, read from the parts that use them; the state between in a ramp."""
         ...

@@ -7,7 +7,7 @@ present input held briefly and faded, then a smooth stop.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -55,6 +55,7 @@ class Classical:
     """
 
     name = "classical"
+    tunables: ClassVar[frozenset[str]] = frozenset({"gain", "rotation_gain", "tilt_rate"})
 
     def __init__(
         self, machine: Machine, tuning: Tuning, period: float, filters: FilterSet = REID_NAHON
@@ -81,6 +82,11 @@ class Classical:
     def retune(self, tuning: Tuning) -> None:
         """Take other tunables: gains and the limit of tilt rate."""
         self._tuning = tuning
+
+    @property
+    def tuning(self) -> Tuning:
+        """Tunables in force."""
+        return self._tuning
 
     def propose(
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from scipy.linalg import expm
 
 from motionserver.core.axes import GRAVITY, Array, frozen
+from motionserver.errors import TunableError
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +93,7 @@ def filter_set(name: str) -> FilterSet:
         ValueError: There is none, or its channel cannot be controlled through one input.
     """
     if name not in FILTER_SETS:
-        raise ValueError(
-            f"filter set {name!r} does not exist; allowed: {', '.join(FILTER_SETS)}; "
-            "change tuning.filters"
-        )
+        raise TunableError("filters", f"filter set {name!r} does not exist", ", ".join(FILTER_SETS))
     chosen = FILTER_SETS[name]
     check_controllable(channel(chosen.high, chosen.low), f"filter set {name!r}")
     return chosen
@@ -171,9 +170,22 @@ def check_controllable(block: Block, name: str) -> None:
 
 def discretise(block: Block, step: float) -> tuple[Array, Array]:
     """Exact zero-order hold over ``step`` [s]: A_d (n, n), B_d (n,)."""
-    size = len(block.A)
+    matrix = np.ascontiguousarray(block.A, dtype=float)
+    push = np.ascontiguousarray(block.B, dtype=float)
+    return _held(matrix.tobytes(), push.tobytes(), float(step))
+
+
+@lru_cache(maxsize=1024)
+def _held(matrix: bytes, push: bytes, step: float) -> tuple[Array, Array]:
+    """Zero-order hold of a block given by its bytes.
+
+    An algorithm is made once to prove that its tuning can be used, and its parts again when they
+    come into force: the exponentials, most of the time that takes, are computed once.
+    """
+    vector = np.frombuffer(push)
+    size = len(vector)
     augmented = np.zeros((size + 1, size + 1))
-    augmented[:size, :size] = block.A
-    augmented[:size, size] = block.B
+    augmented[:size, :size] = np.frombuffer(matrix).reshape(size, size)
+    augmented[:size, size] = vector
     full = expm(augmented * step)
     return frozen(full[:size, :size]), frozen(full[:size, size])

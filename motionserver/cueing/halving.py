@@ -10,6 +10,7 @@ from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import jacobian, leg_lengths
 from motionserver.core.limits import Machine
 from motionserver.core.state import PlatformState
+from motionserver.errors import TunableError
 
 STOP_RATE: Final = np.array([1.5, 1.5, 1.5, 1.0, 1.0, 1.0])
 """Deceleration assumed for a stopping distance [m/s2, rad/s2]."""
@@ -20,8 +21,9 @@ OPEN_TIME: Final = 1.5
 
 
 class Halving(Protocol):
-    """Keeps X_max, the position limits in force, (6,) [m, rad]."""
+    """Keeps X_max, the position limits in force, (6,) [m, rad]; ``kind`` is its name."""
 
+    kind: str
     x_max: Array
 
     def settle(self, poses: Array, start: PlatformState, box: Array, trouble: bool) -> None:
@@ -48,13 +50,13 @@ def make_halving(kind: str, machine: Machine, box: Array, period: float) -> Halv
         return PaperHalving(machine, box)
     if kind == "sound":
         return SoundHalving(machine, box, period)
-    raise ValueError(
-        f"halving {kind!r} does not exist; allowed: off, paper, sound; change tuning.halving"
-    )
+    raise TunableError("halving", f"halving {kind!r} does not exist", "off, paper, sound")
 
 
 class Fixed:
     """No adaptation: X_max = X_M."""
+
+    kind = "off"
 
     def __init__(self, box: Array) -> None:
         self.x_max = np.array(box)
@@ -70,6 +72,8 @@ class PaperHalving:
     Repairs without which it has no meaning: |X| in place of X; only axes that drive the worst leg
     out shrink ("the affected direction"); never below where the platform is and must come to.
     """
+
+    kind = "paper"
 
     def __init__(self, machine: Machine, box: Array) -> None:
         self._machine = machine
@@ -94,6 +98,8 @@ class SoundHalving:
     While the plan leaves the legs' stroke, or had to be cut, the axes that drive the worst leg
     close towards the share of the plan that fits; else all open again slowly.
     """
+
+    kind = "sound"
 
     def __init__(self, machine: Machine, box: Array, period: float) -> None:
         self._machine = machine

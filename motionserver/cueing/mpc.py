@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import exp
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from motionserver.core.plan import Plan
 from motionserver.core.state import PlatformState, Stimulus
 from motionserver.cueing.base import Candidate, Report
 from motionserver.cueing.measured import believed
-from motionserver.cueing.mpc_cost import Cost
+from motionserver.cueing.mpc_cost import WEIGHED, Cost
 from motionserver.cueing.mpc_grid import PIECES, make_spline_grid
 from motionserver.cueing.mpc_nominal import Nominal, Projection
 from motionserver.cueing.mpc_outputs import linearise
@@ -57,6 +57,25 @@ class SixAxis:
     """
 
     name = "mpc"
+    tunables: ClassVar[frozenset[str]] = frozenset(
+        {
+            "rotation_gain",
+            "tilt_rate",
+            "box",
+            "horizon",
+            "weight_force",
+            "reference",
+            "predictor",
+            "backend",
+            "mpc_weight_heave",
+            "mpc_weight_rates",
+            "mpc_weight_position",
+            "mpc_weight_attitude",
+            "mpc_weight_tilt_rate",
+            "mpc_trust",
+            "perception",
+        }
+    )
 
     def __init__(
         self,
@@ -78,12 +97,13 @@ class SixAxis:
 
     def _build(self, tuning: Tuning) -> None:
         grid = make_spline_grid(tuning.horizon, self._period, self._pieces)
-        self._reference = self._make_reference(tuning, grid.nodes)
-        self._grid = grid
-        self._projection = Projection(grid)
-        self._rows = Rows(self._machine, grid, self._period, tuning.box)
-        self._cost = Cost(grid, self._rows.layout, tuning, self._period)
-        self._backend = make_solver(tuning.backend, grid, self._cost, self._iterations)
+        reference = self._make_reference(tuning, grid.nodes)
+        rows = Rows(self._machine, grid, self._period, tuning.box)
+        cost = Cost(grid, rows.layout, tuning, self._period)
+        backend = make_solver(tuning.backend, grid, cost, self._iterations)
+        # nothing is replaced before everything is made
+        self._reference, self._grid, self._projection = reference, grid, Projection(grid)
+        self._rows, self._cost, self._backend = rows, cost, backend
         slacks = self._rows.layout.slacks
         self._box = np.zeros(slacks), np.full(slacks, INFINITE)
 
@@ -106,9 +126,22 @@ class SixAxis:
                 reference = self._make_reference(tuning, self._grid.nodes)
             if old.backend != tuning.backend:
                 backend = make_solver(tuning.backend, self._grid, self._cost, self._iterations)
-            self._reference, self._backend = reference, backend
             self._cost.weigh(tuning)
+            self._reference, self._backend = reference, backend
         self._tuning = tuning
+
+    @property
+    def tuning(self) -> Tuning:
+        """Tunables in force, read from the parts that use them."""
+        weights = self._cost.tuning
+        return replace(
+            self._tuning,
+            horizon=self._grid.horizon,
+            reference=self._reference.model,
+            predictor=self._reference.predictor,
+            backend=self._backend.name,
+            **{name: getattr(weights, name) for name in WEIGHED},
+        )
 
     def propose(
         self, start: PlatformState, parent: Plan, takeover: float, stimulus: Stimulus

@@ -14,6 +14,7 @@ from motionserver.cueing.mpc_outputs import Outputs, linearise
 from motionserver.cueing.mpc_rows import Layout
 from motionserver.cueing.perception import FAMILIES, Perceived
 from motionserver.cueing.tuning import Tuning
+from motionserver.errors import TunableError
 
 HEAVE_SHARE: Final = 3.0
 """Price of heave travel, in units of that of surge and sway; of yaw angle twice that of tilt."""
@@ -28,6 +29,17 @@ to shake by 0.4 m/s2."""
 JERK.setflags(write=False)
 TILT_SLACK_SQUARE: Final = 1.0
 """Quadratic part of the price of tilting too fast, in units of the linear one."""
+WEIGHED: Final = (
+    "weight_force",
+    "mpc_weight_heave",
+    "mpc_weight_rates",
+    "mpc_weight_position",
+    "mpc_weight_attitude",
+    "mpc_weight_tilt_rate",
+    "mpc_trust",
+    "perception",
+)
+"""Tunables that act here."""
 LEG_SLACK: Final = (10.0, 0.001)
 """Linear and quadratic price of leaving the legs' margins, per `SLACK_UNIT`."""
 
@@ -63,6 +75,11 @@ class Cost:
         errors of several.
         """
         return None if self._perceived is not None else self._outputs
+
+    @property
+    def tuning(self) -> Tuning:
+        """The tuning whose weights are in force."""
+        return self._tuning
 
     @property
     def prices(self) -> Array:
@@ -181,8 +198,7 @@ def make_perceived(name: str, nodes: Array, period: float) -> Perceived | None:
     if name == "none":
         return None
     if name not in FAMILIES:
-        raise ValueError(
-            f"perception {name!r} does not exist; allowed: none, {', '.join(FAMILIES)}; "
-            "change tuning.perception"
+        raise TunableError(
+            "perception", f"perception {name!r} does not exist", f"none, {', '.join(FAMILIES)}"
         )
     return Perceived(FAMILIES[name], nodes, period)

@@ -17,6 +17,7 @@ import numpy as np
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.state import PlatformState
+from motionserver.errors import TunableError
 
 PIECES: Final = 15
 FEWEST: Final = 6
@@ -118,9 +119,11 @@ def make_spline_grid(horizon: float, period: float, pieces: int = PIECES) -> Spl
         ValueError: Too few pieces, or more than fit into the horizon.
     """
     if pieces < FEWEST or pieces * period > horizon:
-        raise ValueError(
+        raise TunableError(
+            "horizon",
             f"six-axis MPC: {pieces} pieces do not fit; allowed {FEWEST} to "
-            f"{int(horizon / period)} for a horizon of {horizon:g} s and a period of {period:g} s"
+            f"{int(horizon / period)} for a horizon of {horizon:g} s and a period of {period:g} s",
+            f"at least {max(pieces, FEWEST) * period:.3g} s with {pieces} pieces",
         )
     powers = np.maximum(np.arange(pieces) - 1.0, 0.0) ** GROWTH_POWER
     growth = (horizon / period - pieces) / powers.sum()

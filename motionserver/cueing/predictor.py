@@ -126,8 +126,7 @@ def named(name: str) -> Predictor:
     """
     if name not in predictor_names():
         raise PredictorError(
-            f"predictor {name!r} does not exist; allowed: {', '.join(predictor_names())}; "
-            "change tuning.predictor"
+            f"predictor {name!r} does not exist; allowed: {', '.join(predictor_names())}"
         )
     return load(files("motionserver.presets").joinpath("predictors").joinpath(f"{name}.json"))
 

@@ -15,13 +15,14 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.core.state import Driver, Stimulus
-from motionserver.cueing.predictor import named
+from motionserver.cueing.predictor import PredictorError, named, predictor_names
 from motionserver.cueing.preview import PreviewKeeper
 from motionserver.cueing.reference_ar import Autoregressive
 from motionserver.cueing.reference_base import AxisModel
 from motionserver.cueing.reference_learned import Learned
 from motionserver.cueing.reference_simple import Constant, Fade
 from motionserver.cueing.reference_vehicle import Vehicle
+from motionserver.errors import TunableError
 
 LARGEST_FORCE: Final = 50.0
 """More than this is believed of no stimulus [m/s2]."""
@@ -96,14 +97,17 @@ class Reference:
         self, model: str, period: float, times: Array, lead: float, predictor: str = "truck"
     ) -> None:
         if model not in _MAKERS:
-            raise ValueError(
-                f"reference model {model!r} does not exist; allowed: {', '.join(MODELS)}; "
-                "change tuning.reference"
+            raise TunableError(
+                "reference", f"reference model {model!r} does not exist", ", ".join(MODELS)
             )
-        self.model = model
+        self.model, self.predictor = model, predictor
         self._lead = lead
         instants = times + lead
-        self._axes = _MAKERS[model](period, instants, predictor)
+        try:
+            self._axes = _MAKERS[model](period, instants, predictor)
+        except PredictorError as error:
+            names = ", ".join(predictor_names())
+            raise TunableError("predictor", str(error), f"one of {names}") from error
         self._preview = PreviewKeeper(period, instants)
 
     def predict(self, stimulus: Stimulus, turning: Array | None = None) -> Array:

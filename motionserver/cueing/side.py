@@ -88,6 +88,10 @@ class SideEngine:
         """
         self._continue(replace(plan, plan_id=next(_numbers)), max(0.0, clock - self._period))
 
+    def settle(self) -> None:
+        """Bring a changed tuning into force at once: nothing is cued."""
+        self._thinker.settle()
+
     def _continue(self, plan: Plan, clock: float) -> None:
         self._plan, self._clock = plan, clock
         self._before: Plan | None = None

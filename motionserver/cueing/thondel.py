@@ -8,7 +8,7 @@ box (Table 2), the threshold of tilt rate (Table 1, soft) and, beyond the paper,
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
@@ -64,6 +64,26 @@ class Thondel:
     """
 
     name = "thondel2014"
+    tunables: ClassVar[frozenset[str]] = frozenset(
+        {
+            "rotation_gain",
+            "tilt_rate",
+            "tilt_acceleration",
+            "tilt_acceleration_weight",
+            "box",
+            "halving",
+            "legs",
+            "horizon",
+            "weight_force",
+            "weight_input",
+            "weight_change",
+            "weight_position",
+            "filters",
+            "reference",
+            "predictor",
+            "backend",
+        }
+    )
 
     _halving: Halving
 
@@ -93,9 +113,8 @@ class Thondel:
         old = self._tuning
         self._check(tuning)
         if (old.filters, old.horizon) != (tuning.filters, tuning.horizon):
-            filters = filter_set(tuning.filters)
             self._grid = make_grid(tuning.horizon, self._period)
-            self._rotation.rebuild(filters, self._grid)
+            self._rotation.rebuild(filter_set(tuning.filters), self._grid)
             self._build(tuning)
         else:
             self._programme.weigh(tuning)
@@ -107,6 +126,20 @@ class Thondel:
             self._halving.x_max = x_max if tuning.halving != "off" else self._halving.x_max
         self._tuning = tuning
 
+    @property
+    def tuning(self) -> Tuning:
+        """Tunables in force, read from the parts that use them."""
+        return replace(
+            self._programme.tuning,
+            rotation_gain=self._tuning.rotation_gain,
+            horizon=self._horizon,
+            filters=self._filters,
+            halving=self._halving.kind,
+            reference=self._reference.model,
+            predictor=self._reference.predictor,
+            backend=self._programme.backend,
+        )
+
     def _check(self, tuning: Tuning) -> None:
         """Stumble over words that do not exist before anything is changed."""
         filter_set(tuning.filters)
@@ -117,8 +150,9 @@ class Thondel:
 
     def _build(self, tuning: Tuning) -> None:
         """Everything that depends on the grid or the filters."""
-        grid = self._grid
-        self._plant = make_plant(filter_set(tuning.filters), grid, self._machine.head)
+        grid, filters = self._grid, filter_set(tuning.filters)
+        self._filters, self._horizon = filters.name, tuning.horizon
+        self._plant = make_plant(filters, grid, self._machine.head)
         self._programme = Programme(self._machine, self._plant, tuning)
         self._reference = self._make_reference(tuning)
         belongs = (grid.node_piece == np.arange(self._plant.moves)[:, None]) * grid.node_share

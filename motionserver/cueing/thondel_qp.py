@@ -45,10 +45,16 @@ class Programme:
 
     def weigh(self, tuning: Tuning) -> None:
         """Take other weights, thresholds or box; the solver is kept where the size allows it."""
+        rows = make_rows(self._plant, tuning)
+        shape = (tuning.backend, tuning.legs, rows.layout.size)
+        if shape != self._shape:
+            # first of all, since this may fail
+            self._backend = make_backend(tuning.backend)
+            self._shape = shape
         self._tuning = tuning
         self._cost = make_cost(self._plant, tuning)
-        self._rows = make_rows(self._plant, tuning)
-        self.layout = layout = self._rows.layout
+        self._rows = rows
+        self.layout = layout = rows.layout
         hessian = np.diag(self._rows.curvature)
         hessian[: layout.inputs, : layout.inputs] += self._cost.H
         self._hessian = frozen(hessian)
@@ -57,14 +63,20 @@ class Programme:
         self._lowest = np.concatenate((-inputs, np.zeros(slacks)))
         self._highest = np.concatenate((inputs, np.full(slacks, np.inf)))
         self._box_slack = np.tile(np.arange(6) + layout.box.start, len(self.looks))
-        shape = (tuning.backend, tuning.legs, layout.size)
-        if shape != self._shape:
-            self._backend = make_backend(tuning.backend)
-            self._shape = shape
         # near neutral either end may come first, so both stand
         sides = [self._box_rows(side) for side in (1.0, -1.0)]
         self._constant = QpMatrices(self._hessian, np.concatenate((self._rows.A, *sides)))
         self._handed_over = False
+
+    @property
+    def tuning(self) -> Tuning:
+        """The tuning whose weights, thresholds and box are in force."""
+        return self._tuning
+
+    @property
+    def backend(self) -> str:
+        """Name of the solver in use."""
+        return self._backend.name
 
     def solve(
         self,

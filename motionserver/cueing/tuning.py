@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from math import radians
+from typing import Final
 
 import numpy as np
 
 from motionserver.core.axes import Array, frozen
 
+Option = float | bool | str
+"""Value of a plug-in's own option."""
+
 
 @dataclass(frozen=True, slots=True)
 class Tuning:
-    """Tunables of all algorithms.
+    """Tunables of all algorithms; which of them an algorithm reads, it declares itself.
 
     Attributes:
         algorithm: "mpc", "thondel2014" or "classical".
@@ -24,8 +29,6 @@ class Tuning:
         tilt_acceleration: Threshold of angular acceleration [rad/s2]; soft, see
             tilt_acceleration_weight.
         tilt_acceleration_weight: Weight of exceeding it; 0 = row off [-].
-        translation_threshold: Threshold of translational acceleration [m/s2]: dead band of the
-            false-cue figures and bound of washout motion against the cue.
         box: Position limits per axis, (6,) [m, rad] (Table 2); at most the machine's.
         horizon: Prediction horizon [s].
         weight_force: Weight of the specific-force error.
@@ -46,6 +49,7 @@ class Tuning:
         mpc_trust: How far a reference model is believed: weights of the error fall to 1/e at
             that time after the last thing known [s].
         perception: Weighting of the error: "none", "telban-cardullo" or "reid-nahon".
+        options: What plug-ins have of their own: by algorithm, then by the name the plug-in gave.
     """
 
     algorithm: str = "mpc"
@@ -55,7 +59,6 @@ class Tuning:
     tilt_rate: float = radians(3.0)
     tilt_acceleration: float = radians(0.3)
     tilt_acceleration_weight: float = 0.0
-    translation_threshold: float = 0.1
     box: Array = field(
         default_factory=lambda: frozen([0.198, 0.220, 0.200, *np.radians([17.5, 16.3, 17.5])])
     )
@@ -77,17 +80,37 @@ class Tuning:
     mpc_weight_tilt_rate: float = 2.0
     mpc_trust: float = 1.0
     perception: str = "none"
+    options: Mapping[str, Mapping[str, Option]] = field(default_factory=dict)
+
+    @property
+    def own(self) -> Mapping[str, Option]:
+        """Options of the algorithm that is named, as its plug-in declared them."""
+        return self.options.get(self.algorithm, {})
+
+
+TUNABLES: Final = frozenset(item.name for item in fields(Tuning)) - {"options"}
+"""Names of all tunables that algorithms share."""
+COMMON: Final = frozenset({"algorithm", "scale"})
+"""Tunables that act in front of every algorithm."""
+AT_ONCE: Final = frozenset({"horizon"})
+"""Numbers that are not ramped: each step would build the algorithm's programme anew."""
 
 
 def blend(old: Tuning, new: Tuning, share: float) -> Tuning:
-    """Go from one tuning to another: numbers linearly, words and switches at once."""
+    """Go from one tuning to another: numbers linearly; words, switches and `AT_ONCE` at once."""
     changes: dict[str, object] = {}
     for item in fields(Tuning):
-        before, after = getattr(old, item.name), getattr(new, item.name)
-        if isinstance(after, float):
-            changes[item.name] = before + share * (after - before)
-        elif isinstance(after, np.ndarray):
-            changes[item.name] = frozen(before + share * (after - before))
-        else:
-            changes[item.name] = after
+        if item.name not in AT_ONCE:
+            before, after = getattr(old, item.name), getattr(new, item.name)
+            changes[item.name] = _between(before, after, share)
     return replace(new, **changes)  # type: ignore[arg-type]
+
+
+def _between(before: object, after: object, share: float) -> object:
+    if isinstance(after, float) and isinstance(before, float):
+        return before + share * (after - before)
+    if isinstance(after, np.ndarray) and isinstance(before, np.ndarray):
+        return frozen(before + share * (after - before))
+    if isinstance(after, Mapping) and isinstance(before, Mapping):
+        return {name: _between(before.get(name), one, share) for name, one in after.items()}
+    return after

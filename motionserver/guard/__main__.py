@@ -18,6 +18,7 @@ from motionserver.guard.ports import open_link
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.parent import follow_parent
 from motionserver.telemetry.realtime import take_priority
+from motionserver.telemetry.signals import ignore_signals, let_through
 
 
 def main() -> int:
@@ -28,6 +29,8 @@ def main() -> int:
     """
     told: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
+    ignore_signals(but=(signal.SIGTERM,))
+    let_through()
     follow_parent()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])

@@ -21,9 +21,10 @@ from motionserver.core.safety.patient import slices_per_tick
 from motionserver.core.safety.setpoint import Setpoint
 from motionserver.core.safety.states import RAISED, State
 from motionserver.core.safety.supervisor import is_standing
-from motionserver.core.safety.will import will_of
+from motionserver.core.safety.will import Will, will_of
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
+from motionserver.guard.send_grid import SendGrid
 from motionserver.guard.snapshot import snapshot
 from motionserver.telemetry.blackbox.guard_box import GuardBox
 from motionserver.telemetry.logs import Seldom
@@ -45,8 +46,8 @@ class GuardLoop:
         self, options: GuardOptions, run_dir: Path, link: socket.socket, scheduling: str
     ) -> None:
         self.options = options
-        self._ticks_per_send = ticks_per_send(options.rate_hz)
-        self._tick_ns = SECOND / (self._ticks_per_send * options.rate_hz)
+        ticks = ticks_per_send(options.rate_hz)
+        self._tick_ns = SECOND / (ticks * options.rate_hz)
         slices = slices_per_tick(self._tick_ns / SECOND)
         self.guard = Guard(replace(options.guard, slices=slices))
         self._box = GuardBox(run_dir, self.guard)
@@ -55,16 +56,16 @@ class GuardLoop:
         self._lateness = Lateness(int(self._tick_ns))
         self._leave = False
         self._seen_event = 0
-        self._last_ns = 0
-        self._tick = 0
-        self._sent_slot = -1
+        self._start_ns = self._last_ns = now_ns()
+        self._grid = SendGrid(self._tick_ns, ticks, self._start_ns)
+        self._tick_due_ns = 0
+        self._ticks = 0
         self._sends: deque[int] = deque(maxlen=120)
         self._snapshot_ns = 0
         self._taken_ns = 0
         self._setpoint: Setpoint | None = None
         self._done: asyncio.Future[int] | None = None
         self._early: tuple[Feedback, ...] = ()
-        self._start_ns = now_ns()
         self.scheduling = scheduling
         self._seldom = Seldom(log)
 
@@ -77,13 +78,11 @@ class GuardLoop:
         loop = asyncio.get_running_loop()
         self._done = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         gc.freeze()
         gc.disable()
         ticker = Ticker(self._wake)
-        self._begin(now_ns())
         self._ticker = ticker
-        ticker.arm(int(self._start_ns + (self._tick + 1) * self._tick_ns))
+        self._begin(now_ns())
         machine = self.guard.machine
         log.info("guard ready, limits %s of %s; %s", machine.digest, machine.name, self.scheduling)
         try:
@@ -94,22 +93,28 @@ class GuardLoop:
     def _begin(self, now: int) -> None:
         """Start the clock; after another guard in its rhythm, so that no packet comes too soon."""
         self._start_ns = self._last_ns = now
+        self._grid = SendGrid(self._tick_ns, ticks_per_send(self.options.rate_hz), now)
         left = self._ports.left()
-        if left is None:
-            return
-        will, is_sent = left
-        if not is_sent:
-            # it died about its packet; a base that answers it has got it
+        if left is not None:
+            self._follow(*left, now)
+        elif self._ports.has_predecessor:
+            # it may have sent a packet just now
+            self._grid.keep_apart(now)
+        self._arm(self._grid.first_tick(now))
+
+    def _follow(self, will: Will, sent_ns: int | None, now: int) -> None:
+        """Go on behind the guard that left ``will``; ``sent_ns`` is None if it died about it."""
+        if sent_ns is None:
+            # a base that answers the packet has got it, whenever that was
             self._early = self._ports.feedback()
-            is_sent = bool(self._early)
-        if inherit(self.guard, will, now, is_sent):
+        if inherit(self.guard, will, now, sent_ns is not None or bool(self._early)):
             self._taken_ns = now
-        send_ns = self._ticks_per_send * self._tick_ns
-        slots = (now - will.due_ns) // send_ns + 1
-        self.guard.record.counters["missed_slots"] += max(0, int(slots))
-        # slot 0 is the one the guard before has sent in, or missed
-        self._start_ns = int(will.due_ns + (slots - 1) * send_ns)
-        self._tick, self._sent_slot = int((now - self._start_ns) / self._tick_ns), 0
+        self._ports.sent_ns = now if sent_ns is None else sent_ns
+        self._grid.resume(will.due_ns, self._ports.sent_ns, now)
+
+    def _arm(self, instant_ns: int) -> None:
+        self._tick_due_ns = instant_ns
+        self._ticker.arm(instant_ns)
 
     def ask_to_leave(self, why: str) -> None:
         """Park and end; asking again does not hurry it."""
@@ -119,29 +124,27 @@ class GuardLoop:
 
     def _wake(self) -> None:
         now = now_ns()
-        slot = int((now - self._start_ns) / self._tick_ns)
-        late = int(now - self._start_ns - (self._tick + 1) * self._tick_ns)
+        late = now - self._tick_due_ns
         self._lateness.ticked(late)
         self._box.ticked(late)
-        self._tick = slot
+        self._ticks += 1
         try:
-            self._step(now, slot)
+            self._step(now)
         except Exception:
             # the guard must not die of a surprise: the plan's clock pauses for this tick
             self.guard.record.counters["tick_errors"] += 1
             self._seldom.exception(now, "tick failed")
-        self._ticker.arm(int(self._start_ns + (slot + 1) * self._tick_ns))
+        # what this tick took may have been longer than a tick
+        self._arm(self._grid.next_tick(now))
 
-    def _step(self, now: int, slot: int) -> None:
-        send_slot = slot // self._ticks_per_send
-        is_due = send_slot != self._sent_slot
+    def _step(self, now: int) -> None:
         requests = self._requests.poll()
         counters = self.guard.record.counters
         counters["request_malformed"] = self._requests.malformed
         given = TickInput(
             now_ns=now,
             gap=(now - self._last_ns) / SECOND,
-            is_due=is_due,
+            is_due=self._grid.is_due(now),
             feedback=self._early + self._ports.feedback(),
             cue=self._ports.cue(),
             proposal=self._ports.proposal(),
@@ -154,17 +157,11 @@ class GuardLoop:
             counters["late_ticks"] += 1
         self._last_ns, self._early = now, ()
         setpoint, answers = self.guard.tick(given)
+        is_sent = False
         if setpoint is not None:
-            if self._sent_slot >= 0:
-                counters["missed_slots"] += send_slot - self._sent_slot - 1
-            self._sent_slot = send_slot
-            self._sends.append(now)
-        due = int(self._start_ns + (send_slot + 1) * self._ticks_per_send * self._tick_ns)
-        # the planner must know of an acceptance at once, or it continues the wrong parent
-        if setpoint is not None or self._ports.has_news(self.guard.record):
-            sent = self._sends[-1] if self._sends else now
-            self._ports.publish(sent, now, due, self.guard.record)
-        is_sent = setpoint is not None and self._send(setpoint, now, due)
+            is_sent = self._send(setpoint, now)
+        elif self._ports.has_news(self.guard.record):
+            self._publish(now, self._grid.due_ns)
         if given.proposal is not self.guard.judged:
             # the black box writes a verdict into the tick it was given in
             given = replace(given, proposal=self.guard.judged)
@@ -174,7 +171,7 @@ class GuardLoop:
             answer = {"ok": not refusal, "state": record.state, "reason": refusal or record.reason}
             self._requests.answer(address, answer)
         self._log_events()
-        if record.state is State.PARKED and slot % 4096 == 0:
+        if record.state is State.PARKED and self._ticks % 4096 == 0:
             gc.collect()
         self._maybe_end(now)
         is_last = self._done is not None and self._done.done()
@@ -184,20 +181,36 @@ class GuardLoop:
             self._snapshot_ns = now
             self._show(now)
 
-    def _send(self, setpoint: Setpoint, now: int, due: int) -> bool:
+    def _send(self, setpoint: Setpoint, now: int) -> bool:
         """Write the will, send, tell that it was sent.
 
         Whenever we die, no sample is sent twice and none is left out.
         """
+        grid, record = self._grid, self.guard.record
+        due = grid.expected_due(now)
+        record.counters["missed_slots"] += grid.take(now)
+        self._sends.append(now)
+        # the planner must know of an acceptance at once, or it continues the wrong parent
+        self._publish(now, due)
         self._setpoint = setpoint
         self._leave_will(due)
-        is_sent = self._ports.send(setpoint)
+        try:
+            is_sent = self._ports.send(setpoint)
+        finally:
+            # by the clock read right behind the call: whatever came between is behind us
+            grid.keep_apart(self._ports.sent_ns)
         self.guard.told(now, is_sent)
         if not is_sent:
             # the plan's clock stood still: what is left is the state behind the packet before
-            self._leave_will(due)
+            self._leave_will(grid.due_ns)
             self._ports.settle()
+        if not is_sent or grid.due_ns != due:
+            self._publish(now, grid.due_ns)
         return is_sent
+
+    def _publish(self, now: int, due: int) -> None:
+        sent = self._sends[-1] if self._sends else now
+        self._ports.publish(sent, now, due, self.guard.record)
 
     def _leave_will(self, due: int) -> None:
         newest = self.guard.supervisor.device.newest

@@ -21,14 +21,7 @@ from motionserver.core.safety.will import Will, WillWriter, unpack_will
 from motionserver.guard.options import GuardOptions
 from motionserver.platforms.base import PlatformPacketError
 from motionserver.platforms.registry import make_platform
-from motionserver.telemetry.link import (
-    REASONS,
-    SEQUENCE,
-    STATES,
-    GuardClock,
-    Maps,
-    unpack_cue,
-)
+from motionserver.telemetry.link import REASONS, SENT, STATES, GuardClock, Maps, unpack_cue
 from motionserver.telemetry.sieve import dropped, sieve
 from motionserver.telemetry.ticker import now_ns
 
@@ -54,6 +47,8 @@ class Ports:
         self._seen_proposal = self._maps.proposal.newest_sequence()
         self._seen_cue = 0
         self._accepted_id = 0
+        self.sent_ns = 0
+        """When the last packet had gone out, at the latest [ns]."""
         self._taken_id = 0
         self._told_of = (0, 0)
         self._keep = keep
@@ -156,13 +151,14 @@ class Ports:
         except OSError:
             self._counters["send_errors"] += 1
             return False
+        self.sent_ns = now_ns()
         self.settle()
         self._counters["packets_sent"] += 1
         return True
 
     def settle(self) -> None:
         """Tell a successor that the packet of the newest will has gone out."""
-        self._maps.sent.write(SEQUENCE.pack(self._maps.will.newest_sequence()))
+        self._maps.sent.write(SENT.pack(self._maps.will.newest_sequence(), self.sent_ns))
 
     def leave(self, will: Will) -> None:
         """Write down what a successor needs, before the packet it tells of goes out.
@@ -174,10 +170,11 @@ class Ports:
         except ValueError:
             self._counters["wills_too_long"] += 1
 
-    def left(self) -> tuple[Will, bool] | None:
-        """What the guard before left, and whether it said that the packet of it went out.
+    def left(self) -> tuple[Will, int | None] | None:
+        """What the guard before left, and when the packet of it had gone out at the latest [ns].
 
-        None if there was none, or it cannot be read.
+        The instant is None if it did not say that the packet went out. All is None if there was no
+        guard before, or what it left cannot be read.
         """
         message, sent = self._maps.will.read(), self._maps.sent.read()
         if message is None:
@@ -187,7 +184,13 @@ class Ports:
         except ValueError:
             self._counters["wills_malformed"] += 1
             return None
-        return will, sent is not None and SEQUENCE.unpack(sent[1])[0] == message[0]
+        sequence, sent_ns = (0, 0) if sent is None else SENT.unpack(sent[1])
+        return will, sent_ns if sequence == message[0] else None
+
+    @property
+    def has_predecessor(self) -> bool:
+        """Whether another guard has left something, readable or not."""
+        return self._maps.will.newest_sequence() > 0
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import sys
 from pathlib import Path
 
@@ -11,10 +12,13 @@ from motionserver.errors import MotionServerError
 from motionserver.planner.loop import PlannerLoop
 from motionserver.planner.options import read_options
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.signals import ignore_signals
 
 
 def main() -> int:
     """Run one planner."""
+    # SIGTERM waits until the loop handles it
+    ignore_signals(but=(signal.SIGTERM,))
     follow_parent()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir = Path(sys.argv[1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Protocol
 
 from motionserver.core.intake.gate import REORDER_NS, Gate, Owner
@@ -169,10 +169,16 @@ class Inputs:
                 )
                 if refusal is not None:
                     said = HINTS.get(refusal, refusal)
+                    if refusal == "out-of-range":
+                        said = f"out-of-range: {gate.last_refusal}"
                     self._refused(refusal, f"{source.name} from {address}: {said}")
                 elif motion.at_platform:
                     sensor.append(motion)
                 else:
+                    if gate.is_restart and motion.mode is DriveMode.DRIVE:
+                        # a count that begins anew in the midst of a drive: another run, another
+                        # place
+                        motion = replace(motion, mode=DriveMode.TELEPORT)
                     vehicle.append(motion)
                     self.owner_input = source
         self.counters["accepted"] += len(vehicle)

@@ -39,6 +39,7 @@ from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
+from motionserver.telemetry.signals import let_through
 from motionserver.telemetry.ticker import Ticker, now_ns, ticks_per_send
 
 SECOND: Final = 1_000_000_000
@@ -58,7 +59,9 @@ class PlannerLoop:
         self._requests = RequestServer(run_dir / "planner.sock")
         self._tuner = Tuner(options)
         homes = frozen(np.stack((np.zeros(6), options.machine.parked_pose)))
-        self._thinker = Thinker(options.machine, self._tuner.tuning(), options.period, homes)
+        self._thinker = Thinker(
+            options.machine, self._tuner.tuning(), options.period, homes, self._tuner.cueing
+        )
         self._sides = Sides(options.machine, options.period, homes, self._tuner.side)
         self._state: State | None = None
         self._inputs = Inputs(
@@ -92,7 +95,7 @@ class PlannerLoop:
         loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = loop.create_future()
         loop.add_signal_handler(signal.SIGTERM, self._finish)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        let_through()
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -163,7 +166,11 @@ class PlannerLoop:
         if handover is not None:
             self._sides.think(stimulus, self._due_ns + int(self.options.period * SECOND))
         elif self._state not in CUED:
+            self._thinker.settle()
             self._sides.stand()
+        else:
+            self._thinker.ramp()
+        self._tuner.look(self._thinker)
         self._show(now, stimulus, handover is not None)
 
     def _ready_ns(self) -> int:
@@ -239,20 +246,20 @@ class PlannerLoop:
     def _serve(self, handover: Handover | None) -> None:
         for message, address in self._requests.poll():
             if message["op"] == "side":
-                answer, names = self._tuner.serve_side(message)
-                if names is not None:
-                    self._sides.want(names)
+                answer = self._tuner.serve_side(message, self._sides, self._thinker.tuning)
             else:
-                answer, tuning = self._tuner.serve(message)
+                answer, tuning = self._tuner.serve(message, self._thinker)
                 if tuning is not None:
-                    answer = self._retune(tuning, handover) or answer
+                    refusal = self._retune(tuning, handover)
+                    answer = refusal or self._tuner.accepted(self._thinker)
             self._requests.answer(address, answer)
 
     def _retune(self, tuning: Tuning, handover: Handover | None) -> dict[str, Any] | None:
         """Take another tuning; the refusal if it names what cannot be made."""
         former, cueing = self._thinker.tuning.algorithm, self._thinker.cueing
         try:
-            self._thinker.retune(tuning, self._sides.warm(tuning.algorithm))
+            warm = self._sides.warm(tuning.algorithm)
+            self._thinker.retune(tuning, warm, self._tuner.taking_over())
         except Exception as error:
             return self._tuner.take_back(f"{tuning.algorithm} cannot be made: {error}")
         if tuning.algorithm == former:

@@ -192,7 +192,7 @@ class PlannerView:
             "refused_because": [str(r) for r in proposal.refusals][:1] if proposal else [],
             "counters": self._counted(inputs, sides),
             "side": sides.shown(thinker.tuning.algorithm),
-            "tuning": tuner.shown(),
+            "tuning": tuner.shown(thinker),
             "tick": timing.lateness.summary(),
             "rates_hz": {"planner": round(self._rate, 2)},
         }

@@ -16,6 +16,7 @@ from motionserver.cueing.scores import Figures, Scores
 from motionserver.cueing.side import SideEngine
 from motionserver.cueing.tuning import Tuning
 from motionserver.planner.spare_time import Cost
+from motionserver.settings.fields import FieldError, TuningError
 from motionserver.telemetry.ticker import now_ns
 
 RESERVE_NS: Final = 1_000_000
@@ -66,6 +67,34 @@ class Sides:
         for name in list(self._engines):
             if name not in self.wanted:
                 del self._engines[name]
+
+    @property
+    def running(self) -> tuple[str, ...]:
+        """Names of the engines that exist."""
+        return tuple(self._engines)
+
+    def take(self, names: Sequence[str], tuning: Tuning) -> None:
+        """Run these beside from now on, once every one that is new has been made.
+
+        Args:
+            names: Known names, each once.
+            tuning: The driving engine's tunables.
+
+        Raises:
+            TuningError: One cannot be made; then nothing has changed.
+        """
+        new = [n for n in names if n not in (*self._engines, tuning.algorithm)]
+        errors = []
+        for name in new:
+            if self._make(tuning, name) is None:
+                why = self._failed.pop(name)
+                allowed = "an engine that can be made with the tuning in force"
+                errors.append(FieldError("engines", name, allowed, f"{name} cannot be made: {why}"))
+        if errors:
+            for name in new:
+                self._engines.pop(name, None)
+            raise TuningError(errors)
+        self.want(names)
 
     def make_one(self, tuning: Tuning) -> None:
         """Make one engine that is wanted and missing: more would take longer than a period."""
@@ -138,6 +167,8 @@ class Sides:
 
     def stand(self) -> None:
         """The platform is not cued: all stand at neutral until it is."""
+        for engine in self._engines.values():
+            engine.settle()
         if self._stands:
             return
         self._stands = True

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import entry_points
-from typing import Any, Final, get_args
+from typing import Any, get_args
 
 from pydantic import Field
 from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 
+from motionserver.cueing.registry import algorithms as algorithms
 from motionserver.errors import MotionServerError
 
 Range = tuple[float, float]
 """Least and largest value."""
-BUILT_IN_ALGORITHMS: Final = ("mpc", "thondel2014", "classical")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +54,6 @@ class TuningError(MotionServerError):
         super().__init__(
             "; ".join(f"{e.field} = {e.value!r}: {e.message}, allowed {e.allowed}" for e in errors)
         )
-
-
-@cache
-def algorithms() -> tuple[str, ...]:
-    """Names of all cueing algorithms: the built-in ones and those of installed plug-ins."""
-    found = {point.name for point in entry_points(group="motionserver.cueing")}
-    return (*BUILT_IN_ALGORITHMS, *sorted(found - set(BUILT_IN_ALGORITHMS)))
 
 
 def number(
@@ -142,14 +133,27 @@ def allowed_range(item: FieldInfo, limit: Range | None) -> str:
     return f"{low:g} to {high:g} {_extra(item)['unit']}".rstrip()
 
 
-def described(name: str, item: FieldInfo, limits: dict[str, Range]) -> dict[str, object]:
-    """One tunable for a page: name, default, meaning, unit, group, label, more, and its range."""
+def described(
+    name: str, item: FieldInfo, limits: dict[str, Range], users: tuple[str, ...]
+) -> dict[str, object]:
+    """One tunable for a page.
+
+    Args:
+        name: Its name.
+        item: Declared by `number` or `choice`, or by a plug-in.
+        limits: Ranges that the machine gives.
+        users: Algorithms that read it.
+
+    Returns:
+        Name, default, meaning, unit, group, label, more, algorithms, and its range.
+    """
     low, high, choices = bounds(item, limits.get(name))
     limited: dict[str, object] = (
         {"choices": list(choices)} if choices else {"min": low, "max": high}
     )
-    about = {"name": name, "default": item.default, "meaning": item.description}
-    return about | _extra(item) | limited
+    plain = {"unit": "", "group": users[0] if users else "", "label": name, "more": ""}
+    about = {"name": name, "default": item.default, "meaning": item.description or ""}
+    return about | plain | _extra(item) | {"algorithms": list(users)} | limited
 
 
 def _extra(item: FieldInfo) -> dict[str, Any]:

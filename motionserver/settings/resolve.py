@@ -10,7 +10,7 @@ from typing import Any
 
 from motionserver.bounded_files import SETTINGS_BYTES, FileNotUsableError, check_regular
 from motionserver.core.axes import frozen
-from motionserver.core.limits import machine_to_mapping
+from motionserver.core.limits import Machine, machine_to_mapping
 from motionserver.cueing.registry import algorithms
 from motionserver.errors import ConfigError
 from motionserver.platforms.base import PlatformOptions
@@ -20,7 +20,9 @@ from motionserver.settings.fields import TuningError
 from motionserver.settings.key_file import read_key
 from motionserver.settings.machine import load_machine, unchecked_limits
 from motionserver.settings.side_engines import side_names
-from motionserver.settings.tuning import apply_changes, default_for
+from motionserver.settings.tuning import BOX_FIELDS, apply_changes, default_for
+from motionserver.settings.tuning_proof import make_with
+from motionserver.settings.tuning_scope import check_effect
 
 
 def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, Any]:
@@ -57,10 +59,8 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             f"Allowed: {', '.join(algorithms())}.",
         )
     tuning = {**cueing.tuning, "algorithm": cueing.algorithm, "scale": cueing.scale}
-    try:
-        apply_changes(default_for(machine), tuning).check_machine(machine)
-    except TuningError as error:
-        raise ConfigError("[cueing.tuning]", str(error), "Correct this value.") from error
+    per_plan = ceil(platform.rate_hz / cueing.rate_max_hz)
+    period = per_plan / platform.rate_hz
     try:
         side = side_names(config.planner.side_engines)
     except TuningError as error:
@@ -69,7 +69,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             "; ".join(f"{e.value}: {e.message}" for e in error.errors),
             f"Allowed: {error.errors[0].allowed}.",
         ) from error
-    per_plan = ceil(platform.rate_hz / cueing.rate_max_hz)
+    _check_tuning(machine, period, tuning, side)
     return {
         "machine": machine_to_mapping(machine),
         "unchecked": unchecked_limits(machine),
@@ -89,8 +89,8 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
             "rate_hz": platform.rate_hz,
         },
         "planner": {
-            "period": per_plan / platform.rate_hz,
-            "budget": min(cueing.budget_ms * 1e-3, 0.8 * per_plan / platform.rate_hz),
+            "period": period,
+            "budget": min(cueing.budget_ms * 1e-3, 0.8 * period),
             "arm": list(cueing.vehicle_head_m),
             "tuning": tuning,
             "side_engines": list(side),
@@ -101,6 +101,36 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         "sources": [_source(one) for one in config.sources],
         "web": _web(config, run_dir, machine_to_mapping(machine)),
     }
+
+
+def _check_tuning(
+    machine: Machine, period: float, tuning: dict[str, Any], side: tuple[str, ...]
+) -> None:
+    """Make every algorithm that shall run, so that none is found missing by the planner.
+
+    Raises:
+        ConfigError: A tunable is wrong, is read by none of them, or cannot be used here.
+    """
+    where = "[cueing.tuning]"
+    try:
+        default = default_for(machine)
+        model = apply_changes(default, tuning)
+        model.check_machine(machine)
+        # the box is read by `motionserver workspace` whatever drives
+        acting = {name: value for name, value in tuning.items() if name not in BOX_FIELDS}
+        check_effect(acting, (model.algorithm, *side), default.values())
+        make_with(machine, period, model, default)
+    except TuningError as error:
+        first = error.errors[0]
+        key = "[cueing] algorithm" if first.field == "algorithm" else where
+        raise ConfigError(key, str(error), "Correct this value, or leave it out.") from error
+    for name in side:
+        try:
+            make_with(machine, period, apply_changes(model, {"algorithm": name}), model)
+        except TuningError as error:
+            raise ConfigError(
+                f"[planner] side_engines: {name}", str(error), "Leave it out, or correct this."
+            ) from error
 
 
 def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:

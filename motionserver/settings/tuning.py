@@ -7,11 +7,11 @@ from math import degrees, radians
 from typing import Any, Final
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import PrivateAttr, ValidationError
 
 from motionserver.core.axes import AXIS_NAMES, frozen
 from motionserver.core.limits import Machine
-from motionserver.cueing.tuning import Tuning
+from motionserver.cueing.tuning import Option, Tuning
 from motionserver.settings.fields import (
     FieldError,
     Range,
@@ -20,19 +20,19 @@ from motionserver.settings.fields import (
     described,
     shown,
 )
-from motionserver.settings.tuning_fields import TuningFields
+from motionserver.settings.tuning_fields import REMOVED, SI_NAMES, UNIT_NAMES, TuningFields
+from motionserver.settings.tuning_options import (
+    checked_options,
+    default_options,
+    nested_options,
+    option_fields,
+)
+from motionserver.settings.tuning_scope import names_of, users_of
 
 _UNITS: Final = {"m": 1.0, "deg": radians(1.0)}
 BOX_FIELDS: Final = tuple(
     f"box_{axis}_{'m' if index < 3 else 'deg'}" for index, axis in enumerate(AXIS_NAMES)
 )
-_SI_NAMES: Final = {
-    "tilt_rate_deg_s": "tilt_rate",
-    "tilt_acceleration_deg_s2": "tilt_acceleration",
-    "translation_threshold_m_s2": "translation_threshold",
-    "horizon_s": "horizon",
-    "mpc_trust_s": "mpc_trust",
-}
 _LEAST_BOX: Final = {"m": 0.005, "deg": 0.5}
 """Least half width of the box on machines that have much more than that."""
 _LEAST_SHARE: Final = 0.1
@@ -42,16 +42,41 @@ _ROUNDING: Final = 1e-9
 
 
 class TuningModel(TuningFields):
-    """Everything that may change while the platform moves. Hard limits are not here."""
+    """Everything that may change while the platform moves. Hard limits are not here.
+
+    Options of plug-ins stand beside the fields; they are declared elsewhere, see `tuning_options`.
+    """
+
+    _options: dict[str, Option] = PrivateAttr(default_factory=dict)
+
+    @property
+    def options(self) -> dict[str, Option]:
+        """Options of plug-ins that differ from their defaults."""
+        return self._options
+
+    def with_options(self, options: dict[str, Option]) -> TuningModel:
+        """The same with these options of plug-ins, checked before."""
+        made = self.model_copy()
+        made._options = options
+        return made
+
+    def values(self) -> dict[str, Any]:
+        """All tunables by name, the options of plug-ins included."""
+        return self.model_dump() | default_options() | self._options
+
+    def live_values(self) -> dict[str, Any]:
+        """Those that the algorithm reads."""
+        values = self.values()
+        return {name: values[name] for name in names_of(self.algorithm)}
 
     def to_tuning(self) -> Tuning:
         """The same in SI."""
         values: dict[str, Any] = self.model_dump(exclude=set(BOX_FIELDS))
-        for name, si_name in _SI_NAMES.items():
+        for name, si_name in UNIT_NAMES.items():
             values[si_name] = values.pop(name) * (radians(1.0) if "_deg" in name else 1.0)
         units = [_UNITS[name.rsplit("_", 1)[1]] for name in BOX_FIELDS]
         box = np.array([getattr(self, name) for name in BOX_FIELDS]) * np.array(units)
-        return Tuning(**values, box=frozen(box))
+        return Tuning(**values, box=frozen(box), options=nested_options(self._options))
 
     @classmethod
     def from_tuning(cls, tuning: Tuning) -> TuningModel:
@@ -63,14 +88,38 @@ class TuningModel(TuningFields):
         values: dict[str, Any] = {
             item.name: getattr(tuning, item.name)
             for item in dataclass_fields(Tuning)
-            if item.name != "box"
+            if item.name not in ("box", "options")
         }
-        for name, si_name in _SI_NAMES.items():
+        for name, si_name in UNIT_NAMES.items():
             value = values.pop(si_name)
             values[name] = round(degrees(value), 9) if "_deg" in name else value
         for name, value in zip(BOX_FIELDS, tuning.box.tolist(), strict=True):
             values[name] = round(degrees(value), 9) if name.endswith("_deg") else value
-        return _validated(values)
+        options: dict[str, object] = {
+            f"{algorithm}_{name}": value
+            for algorithm, own in tuning.options.items()
+            for name, value in own.items()
+        }
+        return apply_changes(_validated(values), options)
+
+    def showing(self, tuning: Tuning) -> dict[str, Any]:
+        """The values of a tuning in force; where it is this one, exactly as they stand here.
+
+        Raises:
+            TuningError: It lies outside the bounds.
+        """
+        shown, asked = TuningModel.from_tuning(tuning).values(), self.values()
+        wanted = self.to_tuning()
+        for name in TuningModel.model_fields:
+            si_name = SI_NAMES.get(name, name)
+            if si_name == "box":
+                axis = BOX_FIELDS.index(name)
+                is_same = wanted.box[axis] == tuning.box[axis]
+            else:
+                is_same = getattr(wanted, si_name) == getattr(tuning, si_name)
+            if is_same:
+                shown[name] = asked[name]
+        return shown
 
     def check_machine(self, machine: Machine) -> None:
         """Make sure that the tuned box lies inside the machine's, and is not next to nothing.
@@ -114,7 +163,34 @@ def apply_changes(model: TuningModel, changes: dict[str, object]) -> TuningModel
     Raises:
         TuningError: A name or value that is not allowed; then none is taken.
     """
-    return _validated(model.model_dump() | changes)
+    own = option_fields()
+    shared = {name: value for name, value in changes.items() if name not in own}
+    options = {name: value for name, value in changes.items() if name in own}
+    errors: list[FieldError] = []
+    taken, kept = model, model.options
+    try:
+        taken = _validated(model.model_dump() | shared)
+    except TuningError as error:
+        errors += error.errors
+    try:
+        kept = checked_options({**model.options, **options})
+    except TuningError as error:
+        errors += error.errors
+    if errors:
+        raise TuningError(errors)
+    return taken.with_options(kept)
+
+
+def readable(values: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """Values of a file of an earlier version, without what does not exist any more.
+
+    Returns:
+        What is left, and a sentence for each that was left out.
+    """
+    known = TuningModel.model_fields.keys() | option_fields().keys()
+    gone = [name for name in values if name in REMOVED and name not in known]
+    rest = {name: value for name, value in values.items() if name not in gone}
+    return rest, [f"{name} is {REMOVED[name]}" for name in gone]
 
 
 def _validated(values: dict[str, object]) -> TuningModel:
@@ -127,6 +203,8 @@ def _validated(values: dict[str, object]) -> TuningModel:
 def _explained(item: Any) -> FieldError:  # noqa: ANN401  (pydantic's ErrorDetails)
     name = str(item["loc"][0]) if item["loc"] else "tuning"
     if name not in TuningModel.model_fields:
+        if name in REMOVED:
+            return FieldError(name, shown(item["input"]), "nothing: leave it out", REMOVED[name])
         known = "a name listed by GET /api/tuning"
         return FieldError(ascii(name)[1:-1][:60], shown(item["input"]), known, "no such tunable")
     return FieldError(name, shown(item["input"]), _allowed(name, {}), str(item["msg"]))
@@ -135,7 +213,15 @@ def _explained(item: Any) -> FieldError:  # noqa: ANN401  (pydantic's ErrorDetai
 def describe(machine: Machine | None) -> list[dict[str, object]]:
     """All tunables for a page or a document, in order, within a machine's limits."""
     limits = machine_limits(machine) if machine else {}
-    return [described(name, item, limits) for name, item in TuningModel.model_fields.items()]
+    shared = [
+        described(name, item, limits, users_of(name))
+        for name, item in TuningModel.model_fields.items()
+    ]
+    own = [
+        described(name, item, {}, (algorithm,))
+        for name, (algorithm, _, item) in option_fields().items()
+    ]
+    return shared + own
 
 
 def default_for(machine: Machine) -> TuningModel:

@@ -1,21 +1,34 @@
-"""The tuning in force: its version, its history, and the only way to change it."""
+"""The tuning asked for: its version, its history, and the only way to change it."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, Final
 
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
 from motionserver.settings.fields import FieldError, TuningError
-from motionserver.settings.tuning import TuningModel, apply_changes, default_for
+from motionserver.settings.tuning import TuningModel, apply_changes, default_for, readable
+from motionserver.settings.tuning_scope import without_effect
 
 CHANGES_PER_SECOND: Final = 2
 KEPT: Final = 50
 """Tunings that undo can go back to."""
 _DETAILS: Final = 8
 """Most field errors of one reply, so that it fits a datagram."""
+
+Prepare = Callable[[TuningModel, TuningModel], None]
+"""Proves that the first can be used, the second being in force; raises `TuningError` if not."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """A tuning of the history, and whether it has been in force."""
+
+    model: TuningModel
+    has_worked: bool
 
 
 class TuningBook:
@@ -25,31 +38,46 @@ class TuningBook:
         machine: Whose box bounds the tuning.
         now: Clock [s], increasing.
         model: First tuning; the default of the machine if None.
+        prepare: Makes the algorithm with a changed tuning before it is accepted; None where
+            nothing is driven.
+
+    Attributes:
+        version: Counts the changes.
+        has_worked: Whether the tuning has been in force.
+        warnings: What was left out of a file of an earlier version.
 
     Raises:
         TuningError: The first tuning asks for more than the machine has.
     """
 
     def __init__(
-        self, machine: Machine, now: Callable[[], float], model: TuningModel | None = None
+        self,
+        machine: Machine,
+        now: Callable[[], float],
+        model: TuningModel | None = None,
+        prepare: Prepare | None = None,
     ) -> None:
         self._machine = machine
         self._now = now
-        self._model = model if model is not None else default_for(machine)
+        self._default = default_for(machine)
+        self._model = model if model is not None else self._default
         self._model.check_machine(machine)
-        self._replaced = self._model
-        self._former: deque[TuningModel] = deque(maxlen=KEPT)
+        self._prepare = prepare
+        self._replaced = _Entry(self._model, has_worked=False)
+        self._former: deque[_Entry] = deque(maxlen=KEPT)
         self._changed: deque[float] = deque(maxlen=CHANGES_PER_SECOND)
+        self.has_worked = False
         self.version = 1
+        self.warnings: list[str] = []
 
     @property
     def model(self) -> TuningModel:
-        """The tuning in force, in the units of people."""
+        """The tuning asked for, in the units of people."""
         return self._model
 
     @property
     def tuning(self) -> Tuning:
-        """The tuning in force, SI."""
+        """The tuning asked for, SI."""
         return self._model.to_tuning()
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -78,30 +106,61 @@ class TuningBook:
         return self._tune(changes)
 
     def take_back(self, why: str) -> dict[str, Any]:
-        """Put the tuning in force before the last change back: the last one cannot be used.
+        """Put the tuning before the last change back: the last one did not come into force.
 
         Args:
-            why: What stands in the way.
+            why: What stood in the way.
 
         Returns:
             The refusal to answer with.
         """
-        if self._former and self._former[-1] == self._replaced:
+        if self._former and self._former[-1].model == self._replaced.model:
             self._former.pop()
-        self._model = self._replaced
+        self._model, self.has_worked = self._replaced.model, self._replaced.has_worked
         self.version += 1
         return self._refused("invalid", why)
 
+    def mark_worked(self) -> None:
+        """Note that the tuning is in force: a later start may fall back to it."""
+        self.has_worked = True
+
+    def fallbacks(self) -> Iterator[TuningModel]:
+        """Tunings of the history to fall back to: the newest that has worked first."""
+        newest = list(reversed(self._former))
+        yield from (entry.model for entry in newest if entry.has_worked)
+        yield from (entry.model for entry in newest if not entry.has_worked)
+
+    def fall_back(self, model: TuningModel) -> None:
+        """Replace a tuning that cannot be used by another one; undo does not lead back to it."""
+        if any(entry.model == model for entry in self._former):
+            while self._former.pop().model != model:
+                pass
+        self._model, self.has_worked = model, False
+        self.version += 1
+
     def to_mapping(self) -> dict[str, Any]:
         """Version, values and history as plain values, to be kept over a restart."""
-        former = [model.model_dump() for model in self._former]
-        return {"version": self.version, "values": self._model.model_dump(), "former": former}
+        former = [{"values": e.model.values(), "worked": e.has_worked} for e in self._former]
+        return {
+            "version": self.version,
+            "values": self._model.values(),
+            "worked": self.has_worked,
+            "former": former,
+        }
 
     @classmethod
     def from_mapping(
-        cls, data: dict[str, Any], machine: Machine, now: Callable[[], float]
+        cls,
+        data: dict[str, Any],
+        machine: Machine,
+        now: Callable[[], float],
+        prepare: Prepare | None = None,
     ) -> TuningBook:
         """Rebuild a book from `to_mapping`; the version goes on counting.
+
+        Files of earlier versions are read as well: their history holds plain values, and tunables
+        that were removed since are left out with a warning. What of the history is not allowed any
+        more is dropped with a warning.
 
         Raises:
             TuningError: The values are not allowed (any more) or the mapping is not a book.
@@ -110,25 +169,46 @@ class TuningBook:
         if type(version) is not int or not isinstance(values, dict) or not isinstance(former, list):
             what = FieldError("tuning", None, "version, values and former", "not a tuning book")
             raise TuningError([what])
-        book = cls(machine, now, apply_changes(TuningModel(), values))
+        kept, warnings = readable(values)
+        book = cls(machine, now, apply_changes(default_for(machine), kept), prepare)
         book.version = version
+        book.warnings = warnings
+        book.has_worked = data.get("worked") is True
         for entry in former[-KEPT:]:
-            if isinstance(entry, dict):
-                book._former.append(apply_changes(TuningModel(), entry))
+            book._remember(entry)
         return book
+
+    def _remember(self, entry: object) -> None:
+        if not isinstance(entry, dict):
+            return
+        inner = entry.get("values")
+        values, has_worked = (inner, entry.get("worked") is True) if inner else (entry, False)
+        try:
+            model = apply_changes(self._default, readable(dict(values))[0])
+            model.check_machine(self._machine)
+        except (TuningError, TypeError, ValueError) as error:
+            self.warnings.append(f"an earlier tuning is dropped from the history: {error}"[:300])
+            return
+        self._former.append(_Entry(model, has_worked))
 
     def _tune(self, changes: dict[str, object]) -> dict[str, Any]:
         try:
             wanted = apply_changes(self._model, changes)
             wanted.check_machine(self._machine)
+            same = (self._model.values(), self._default.values())
+            if dead := without_effect(changes, wanted.algorithm, same):
+                raise TuningError(dead)
         except TuningError as error:
-            details = [item.to_mapping() for item in error.errors[:_DETAILS]]
-            return self._refused("invalid", "values outside what is allowed", details)
+            return self._invalid("values outside what is allowed", error)
         if wanted == self._model:
             return self._accepted()
         if self._too_fast():
             return self._refused("rate", f"more than {CHANGES_PER_SECOND} changes a second")
-        self._former.append(self._model)
+        try:
+            self._prove(wanted)
+        except TuningError as error:
+            return self._invalid("a value that cannot be used here; nothing was changed", error)
+        self._former.append(_Entry(self._model, self.has_worked))
         return self._put(wanted)
 
     def _undo(self) -> dict[str, Any]:
@@ -136,7 +216,17 @@ class TuningBook:
             return self._refused("invalid", "nothing to undo")
         if self._too_fast():
             return self._refused("rate", f"more than {CHANGES_PER_SECOND} changes a second")
-        return self._put(self._former.pop())
+        wanted = self._former.pop().model
+        try:
+            self._prove(wanted)
+        except TuningError as error:
+            what = "the tuning before cannot be used any more and has left the history; nothing "
+            return self._invalid(what + "was changed, undo again to go further back", error)
+        return self._put(wanted)
+
+    def _prove(self, wanted: TuningModel) -> None:
+        if self._prepare is not None:
+            self._prepare(wanted, self._model)
 
     def _too_fast(self) -> bool:
         full = len(self._changed) == CHANGES_PER_SECOND
@@ -144,12 +234,17 @@ class TuningBook:
 
     def _put(self, model: TuningModel) -> dict[str, Any]:
         self._changed.append(self._now())
-        self._replaced, self._model = self._model, model
+        self._replaced = _Entry(self._model, self.has_worked)
+        self._model, self.has_worked = model, False
         self.version += 1
         return self._accepted()
 
     def _accepted(self) -> dict[str, Any]:
-        return {"ok": True, "version": self.version, "values": self._model.model_dump()}
+        return {"ok": True, "version": self.version, "values": self._model.values()}
+
+    def _invalid(self, error: str, why: TuningError) -> dict[str, Any]:
+        details = [item.to_mapping() for item in why.errors[:_DETAILS]]
+        return self._refused("invalid", error, details)
 
     def _refused(
         self, kind: str, error: str, details: list[dict[str, object]] | None = None

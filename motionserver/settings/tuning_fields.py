@@ -44,6 +44,10 @@ def _six(default: float, high: float, label: str, meaning: str, more: str) -> An
     return number(default, 0.0, high, "", group="Six axes", label=label, meaning=meaning, more=more)
 
 
+REMOVED: Final = {
+    "translation_threshold_m_s2": "removed: no algorithm ever read it; leave it out",
+}
+"""Tunables of earlier versions: left out of files that hold them, refused in a request."""
 _START: Final = Tuning()
 """Where the defaults stand; here only those are written again that have other units."""
 
@@ -65,7 +69,7 @@ class TuningFields(BaseModel):
     gain: float = number(
         _START.gain, 0.0, 1.0, "", group="Feel", label="Washout gain",
         meaning="Gain of the classical washout, on top of the scale.",
-        more="stronger motion; no effect on the MPC",
+        more="stronger motion",
     )
     rotation_gain: float = number(
         _START.rotation_gain, 0.0, 1.0, "", group="Feel", label="Rotation gain",
@@ -88,11 +92,6 @@ class TuningFields(BaseModel):
         label="Tilt acceleration weight",
         meaning="Price of exceeding that threshold; 0 leaves it out.",
         more="smoother, later tilt",
-    )
-    translation_threshold_m_s2: float = number(
-        0.1, 0.0, 1.0, "m/s2", group="Perception", label="Translation threshold",
-        meaning="Translational acceleration that goes unnoticed; washing out stays below it.",
-        more="faster return to neutral, false cues may be felt",
     )
     box_surge_m: float = _box("surge", 0.198, "m")
     box_sway_m: float = _box("sway", 0.220, "m")
@@ -183,3 +182,16 @@ class TuningFields(BaseModel):
         meaning="Judge the error as the inner ear would: not at all, or with one of two models.",
     )
     # fmt: on
+
+
+UNIT_NAMES: Final = {
+    "tilt_rate_deg_s": "tilt_rate",
+    "tilt_acceleration_deg_s2": "tilt_acceleration",
+    "horizon_s": "horizon",
+    "mpc_trust_s": "mpc_trust",
+}
+"""Tunables that carry their unit here, and their names in `Tuning`."""
+SI_NAMES: Final = UNIT_NAMES | {
+    name: "box" for name in TuningFields.model_fields if name.startswith("box_")
+}
+"""Every tunable with another name in `Tuning`."""

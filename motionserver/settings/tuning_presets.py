@@ -14,8 +14,10 @@ from typing import Any, Final
 import tomli_w
 
 from motionserver.bounded_files import FileNotUsableError, read_bounded
+from motionserver.core.limits import Machine
 from motionserver.settings.fields import FieldError, TuningError
-from motionserver.settings.tuning import TuningModel, apply_changes
+from motionserver.settings.tuning import TuningModel, apply_changes, default_for, readable
+from motionserver.settings.tuning_scope import without_effect
 
 NAME: Final = re.compile(r"[a-z0-9-]{1,40}")
 MOST_SAVED: Final = 100
@@ -25,19 +27,43 @@ _LARGEST: Final = 64 * 1024
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """Some tunables under one name; applying it changes those and leaves the rest.
+    """A whole state under one name: the values its file holds, and the defaults for all others.
 
     Attributes:
         name: Lower-case letters, digits, hyphens, at most 40.
         about: One line for the reader.
         built_in: True if it comes with the server.
-        values: Tunables in the units of people.
+        values: Tunables that its file sets, in the units of people.
+        warnings: What of its file is left out, and why.
     """
 
     name: str
     about: str
     built_in: bool
     values: dict[str, Any]
+    warnings: tuple[str, ...] = ()
+
+    def whole(self, machine: Machine) -> tuple[TuningModel, tuple[str, ...]]:
+        """Every tunable of the state on a machine.
+
+        What the preset's algorithm does not read is left at its default: files of earlier versions
+        hold such values.
+
+        Returns:
+            The state, and what was left out.
+
+        Raises:
+            TuningError: A value is not allowed on this machine.
+        """
+        default = default_for(machine)
+        algorithm = str(self.values.get("algorithm", default.algorithm))
+        dead = without_effect(self.values, algorithm, (default.values(),))
+        names = {error.field for error in dead}
+        live = {name: value for name, value in self.values.items() if name not in names}
+        model = apply_changes(default, live)
+        model.check_machine(machine)
+        left_out = (f"{error.field} is left out: it {error.message}" for error in dead)
+        return model, (*self.warnings, *left_out)
 
 
 class PresetShelf:
@@ -124,8 +150,9 @@ def _parsed(name: str, text: str, *, built_in: bool) -> Preset:
     about, values = data.get("about", ""), data.get("values")
     if not isinstance(about, str) or not isinstance(values, dict):
         raise _error(name, None, "a line 'about' and a table [values]", "not a preset")
-    apply_changes(TuningModel(), values)
-    return Preset(name, about[:200], built_in, values)
+    kept, warnings = readable(values)
+    apply_changes(TuningModel(), kept)
+    return Preset(name, about[:200], built_in, kept, tuple(warnings))
 
 
 def _error(field: str, value: object, allowed: str, message: str) -> TuningError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any, Final
 
+from motionserver.errors import TunableError
 from motionserver.solvers.base import QpBackend
 from motionserver.solvers.stage import StageBackend
 
@@ -57,10 +58,7 @@ def make_backend(
         # not among the backends: nobody shall drive with it
         return _make("piqp", {"iterations": iterations or 200, "tolerance": 1e-9})
     if name not in BACKENDS:
-        raise ValueError(
-            f"QP backend {name!r} does not exist; allowed: {', '.join(BACKENDS)}; "
-            "change tuning.backend"
-        )
+        raise TunableError("backend", f"QP backend {name!r} does not exist", ", ".join(BACKENDS))
     if iterations is not None and iterations < 1:
         raise ValueError(
             f"QP backend {name!r}: a budget of {iterations} iterations finds nothing; allowed is "
@@ -98,10 +96,11 @@ def _made(name: str, where: tuple[str, str], options: dict[str, Any]) -> Any:  #
     module, cls = where
     try:
         return getattr(import_module(module), cls)(**options)
-    except ImportError as error:
-        what = f"motionserver[{name}]" if name in OPTIONAL else name
-        others = ", ".join(other for other in BACKENDS if other not in OPTIONAL)
-        raise ValueError(
-            f"QP backend {name!r} cannot be loaded ({error}); pip install '{what}', or change "
-            f"tuning.backend to one of {others}"
+    except (ImportError, OSError) as error:  # a library beside the module may be missing or broken
+        package = f"motionserver[{name}]" if name in OPTIONAL else name
+        others = ", ".join(o for o in BACKENDS if o not in OPTIONAL and o != name)
+        raise TunableError(
+            "backend",
+            f"QP backend {name!r} cannot be loaded ({error})",
+            f"{name} after pip install '{package}', or one of {others}",
         ) from error

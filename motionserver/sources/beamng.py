@@ -68,6 +68,8 @@ class BeamNgSource:
             rates=frozen([roll_rate, pitch_rate, yaw_rate]),
             speed=math.hypot(*velocity),
             mode=DriveMode.TELEPORT if jumped else DriveMode.DRIVE,
+            attitude=(roll, pitch),
+            speed_known=True,
         )
 
     def _jumped(self, now_ns: int, position: tuple[float, ...]) -> bool:

@@ -28,6 +28,7 @@ class NativeSource:
         except ProtocolError as error:
             raise SourceError(error.reason, str(error)) from error
         gravity, rates, force, speed = LEVEL, frozen(np.zeros(3)), LEVEL, 0.0
+        motion = cue.motion
         if cue.motion is not None:
             gravity = _gravity(cue)
             force = frozen(np.array(cue.motion.acceleration) + gravity)
@@ -46,6 +47,8 @@ class NativeSource:
             preview=_preview(cue, gravity),
             driver=_driver(cue),
             sim_time_ns=cue.sim_time_ns,
+            attitude=None if motion is None else motion.attitude,
+            speed_known=motion is not None and motion.speed is not None,
         )
 
 

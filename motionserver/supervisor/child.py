@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from motionserver.telemetry.parent import PARENT
+from motionserver.telemetry.signals import held_back
 from motionserver.telemetry.ticker import now_ns
 
 QUICK: Final = 5.0
@@ -21,6 +22,8 @@ SLOWEST: Final = 2.0
 """Longest pause before a start [s]."""
 
 log = logging.getLogger("motionserver.supervisor")
+_starting: Final = asyncio.Lock()
+"""One start at a time: the mask of signals is the process's."""
 
 
 @dataclass(slots=True)
@@ -93,16 +96,20 @@ class Child:
         # one thread per process: a solver that spreads over the cores disturbs the guard
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            *self.arguments,
-            *more,
-            pass_fds=self.descriptors,
-            env=environment,
-            stdin=asyncio.subprocess.DEVNULL,
-            # Ctrl-C is the supervisor's: it parks first, then tells the others
-            process_group=0,
-        )
+        async with _starting:
+            # until it has handlers of its own no signal ends it: they wait, or stay ignored
+            with held_back():
+                process = await asyncio.create_subprocess_exec(
+                    sys.executable,
+                    *self.arguments,
+                    *more,
+                    pass_fds=self.descriptors,
+                    env=environment,
+                    stdin=asyncio.subprocess.DEVNULL,
+                    restore_signals=False,
+                    # Ctrl-C is the supervisor's: it parks first, then tells the others
+                    process_group=0,
+                )
         self._process = process
         return process
 

@@ -22,6 +22,7 @@ from motionserver.supervisor.standstill import POLL as LOOK
 from motionserver.telemetry.blackbox.room import make_room
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
+from motionserver.telemetry.signals import PARKING
 from motionserver.telemetry.ticker import now_ns
 
 PARK_PATIENCE: Final = 90.0
@@ -110,7 +111,7 @@ class Service:
             0 if the guard ended parked, 3 if it ended standing in a fault.
         """
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in PARKING:
             loop.add_signal_handler(number, self.leave)
         children = (*self.guards, self.planner, self.web, self.box)
         keepers = [asyncio.create_task(child.keep()) for child in children]

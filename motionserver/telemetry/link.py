@@ -22,7 +22,7 @@ _CLOCK: Final = struct.Struct("<BQdQQQQQBBQ")
 _CUE: Final = struct.Struct("<QQBQQ")
 _TROUBLE_BYTES: Final = 300
 """Longest sentence about the source's packets [bytes of UTF-8]."""
-SEQUENCE: Final = struct.Struct("<Q")
+SENT: Final = struct.Struct("<QQ")
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 _WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
@@ -102,7 +102,8 @@ class Maps:
         clock: Guard to planner: `GuardClock`.
         cue: Planner to guard: the source's status.
         will: Guard to its successor: `core.safety.will.Will`, before every packet.
-        sent: Guard to its successor: sequence of the will whose packet went out, right after it.
+        sent: Guard to its successor: sequence of the will whose packet went out, and when it had
+            gone out at the latest, right after it.
         guard: Guard to page: snapshot as JSON.
         planner: Planner to page: snapshot as JSON.
         service: Supervisor to page: processes as JSON.
@@ -119,7 +120,7 @@ class Maps:
         self.clock = opened("clock", _CLOCK.size)
         self.cue = opened("cue", _CUE.size + _TROUBLE_BYTES)
         self.will = opened("will", _WILL_BYTES)
-        self.sent = opened("sent", SEQUENCE.size)
+        self.sent = opened("sent", SENT.size)
         self.guard = opened("guard", 32768)
         self.planner = opened("planner", 32768)
         self.service = opened("service", 8192)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -18,9 +20,18 @@ _NICENESS = 10
 _BACKLOG = 32
 
 
+class PageServer(uvicorn.Server):
+    """Ends by SIGTERM alone: Ctrl-C is the service's, which parks first."""
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Take the service's signal, and no other."""
+        if sig == signal.SIGTERM:
+            super().handle_exit(sig, frame)
+
+
 def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
     """The HTTP server, with every limit that keeps a flood from costing more than its answers."""
-    return uvicorn.Server(
+    return PageServer(
         uvicorn.Config(
             app,
             host=config.host,

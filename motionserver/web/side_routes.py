@@ -57,4 +57,5 @@ def _check(body: dict[str, Any], path: str) -> None:
 def _response(answer: dict[str, Any], path: str) -> Response:
     if not answer.get("ok"):
         raise tuning_refusal(answer, path)
-    return json_response({"engines": answer["engines"], "allowed": answer["allowed"]})
+    body = {name: answer[name] for name in ("engines", "running", "allowed") if name in answer}
+    return json_response(body)

@@ -9,15 +9,19 @@ from typing import Any, Final
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
+from motionserver.core.limits import Machine
 from motionserver.settings.fields import TuningError
 from motionserver.settings.tuning import TuningModel, apply_changes, default_for, describe
 from motionserver.settings.tuning_presets import Preset, PresetShelf
+from motionserver.settings.tuning_scope import without_effect
 from motionserver.web.described import takes_tunables, versioned
 from motionserver.web.desk import Desk, read_json
 from motionserver.web.refusal import Refusal, json_response
 from motionserver.web.requests import tuning_refusal
 from motionserver.web.tokens import Role
 
+_READ_BACK: Final = ("in_force", "is_ramping", "retune_error", "fallback")
+"""What the planner read from its engine, beside the values asked for."""
 _TAG: Final = re.compile(r'"([0-9]{1,15})"')
 
 
@@ -38,7 +42,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
         caller = desk.require(request, Role.TUNER)
         version = _if_match(request)
         changes = await read_json(request)
-        _check(changes, request.url.path)
+        _checked(changes, request.url.path)
         asked = {"op": "tune", "if_version": version, "changes": changes}
         before = await desk.planner.ask({"op": "tuning"}, request.url.path)
         answer = await desk.planner.ask(asked, request.url.path)
@@ -62,7 +66,7 @@ def tuning_routes(desk: Desk) -> APIRouter:
         found = []
         for name in desk.presets.names():
             try:
-                found.append(_summary(desk.presets.read(name)))
+                found.append(_whole(desk.presets.read(name), machine))
             except (KeyError, TuningError):
                 continue
         return json_response({"presets": found})
@@ -71,21 +75,23 @@ def tuning_routes(desk: Desk) -> APIRouter:
     async def preset(request: Request, name: str) -> Response:
         desk.require(request, Role.VIEWER)
         try:
-            found = desk.presets.read(name)
+            return json_response(_whole(desk.presets.read(name), machine))
         except KeyError:
             raise _no_preset(request.url.path) from None
         except TuningError as error:
             raise _invalid(error, request.url.path) from error
-        return json_response(_summary(found) | {"values": found.values})
 
     @router.put("/api/presets/{name}", openapi_extra=takes_tunables(needed=False))
     async def save(request: Request, name: str) -> Response:
         caller = desk.require(request, Role.TUNER)
-        values = await read_json(request, empty={})
+        asked = await read_json(request, empty={})
         path = request.url.path
-        if not values:
-            values = dict((await desk.planner.ask({"op": "tuning"}, path)).get("values") or {})
-        _check(values, path)
+        if asked:
+            values = _state(asked, path).live_values()
+        else:
+            answer = await desk.planner.ask({"op": "tuning"}, path)
+            kept: dict[str, Any] = answer.get("values") or {}
+            values = _checked(kept, path).live_values()
         before = _values_of(desk.presets, name)
         try:
             saved = desk.presets.save(name, "Saved from the page.", values)
@@ -96,15 +102,24 @@ def tuning_routes(desk: Desk) -> APIRouter:
                           "look at the disk") from error  # fmt: skip
         changes = differences(before, dict(saved.values))
         desk.audit.note("save preset", caller, "done", name=name, changes=changes)
-        return json_response(_summary(saved) | {"values": saved.values}, 201)
+        return json_response(_whole(saved, machine), 201)
 
-    def _check(changes: dict[str, Any], path: str) -> None:
+    def _checked(changes: dict[str, Any], path: str) -> TuningModel:
         """Say what is wrong before the planner is troubled; it checks again."""
         try:
             wanted = apply_changes(default_for(machine), changes)
             wanted.check_machine(machine)
         except TuningError as error:
             raise _invalid(error, path) from error
+        return wanted
+
+    def _state(values: dict[str, Any], path: str) -> TuningModel:
+        """A whole state: these values and the defaults; none that its algorithm does not read."""
+        wanted = _checked(values, path)
+        unread = without_effect(values, wanted.algorithm, (default_for(machine).values(),))
+        if unread:
+            raise _invalid(TuningError(unread), path)
+        return wanted
 
     return router
 
@@ -125,7 +140,9 @@ def _if_match(request: Request) -> int:
 def _tuning_response(answer: dict[str, Any], request: Request, **more: object) -> Response:
     if not answer.get("ok"):
         raise tuning_refusal(answer, request.url.path)
-    body = {"version": answer["version"], "values": answer["values"], **more}
+    read_back = {name: answer[name] for name in _READ_BACK if name in answer}
+    body: dict[str, Any] = {"version": answer["version"], "values": answer["values"]}
+    body |= read_back | more
     return json_response(body, headers={"etag": f'"{answer["version"]}"'})
 
 
@@ -159,8 +176,20 @@ def _values_of(shelf: PresetShelf, name: str) -> dict[str, Any]:
         return {}
 
 
-def _summary(preset: Preset) -> dict[str, Any]:
-    return {"name": preset.name, "about": preset.about, "built_in": preset.built_in}
+def _whole(preset: Preset, machine: Machine) -> dict[str, Any]:
+    """A preset with every tunable of its state.
+
+    Raises:
+        TuningError: A value is not allowed on this machine.
+    """
+    model, warnings = preset.whole(machine)
+    return {
+        "name": preset.name,
+        "about": preset.about,
+        "built_in": preset.built_in,
+        "values": model.values(),
+        "warnings": list(warnings),
+    }
 
 
 def _no_preset(path: str) -> Refusal:

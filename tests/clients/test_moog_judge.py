@@ -234,3 +234,76 @@ def test_a_wire_that_loses_commands_excuses_the_steps_it_hides(lost):
 
 def test_a_wire_that_loses_commands_excuses_no_jump():
     assert after_a_loss(JudgedLimits(may_lose=True), 2, jump=0.03)["violations"] > 0
+
+
+def move(amplitude=0.04, rate=2 * pi * 0.8):
+    """The words of a soft swing at one instant after the other, a period apart."""
+    words = swing(amplitude, rate)
+    return [words(3.0 + k / 60) for k in range(60)]
+
+
+def at_instants(instants, limits=None):
+    """An engaged base that follows softly, then gets a second of a swing at these instants."""
+    host = session(limits=limits)
+    host.play(3.0, swing(0.04, 2 * pi * 0.8))
+    start = host.now
+    for instant, words in zip(instants, move(), strict=True):
+        host.now = start + instant
+        host.send(frame(NEW_POSITION, words))
+    return host
+
+
+def with_one_late(lateness):
+    """Sixty instants, one of them late, the next on the grid again."""
+    return [k / 60 + (lateness if k == 30 else 0.0) for k in range(60)]
+
+
+def test_commands_a_millisecond_apart_are_convicted_in_wall_time():
+    """The step in send order is one period's, as ever: 1 ms of wall time makes it 16 times it."""
+    host = at_instants(with_one_late(1 / 60 - 0.001))
+    told = verdict(host)
+    assert told["violations_by_kind"]["spacing"] == 1
+    assert told["violations_by_kind"]["speed"] == told["violations_by_kind"]["acceleration"] == 0
+    assert told["commands_too_close"] == 1
+    assert told["spacing_min_ms"] == pytest.approx(1.0)
+    # the step about the late command took a sixteenth of its period
+    assert told["wall_speed_max"] > 5 * told["speed_max"]
+    assert {one["kind"] for one in told["first_violations"]} == {"spacing", "wall_speed"}
+
+
+def test_a_step_too_fast_for_its_time_is_convicted_by_leg():
+    host = session(mode=172, limits=JudgedLimits(acceleration=1e6))
+    legs = host.device.target
+    host.now -= 1 / 60 - 0.004
+    # 8 mm in 4 ms are 2 m/s, in a period 0.48 m/s
+    host.send(frame(NEW_POSITION, (*legs[:4], legs[4] + 0.008, legs[5])))
+    told = verdict(host)
+    assert told["violations_by_leg"]["wall_speed"] == [0, 0, 0, 0, 1, 0]
+    assert told["violations_by_kind"]["speed"] == 0
+    assert told["wall_speed_max"] == pytest.approx(2.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("lateness", [0.0, 0.002, 0.003])
+def test_a_little_lateness_is_no_offence_in_wall_time(lateness):
+    assert verdict(at_instants(with_one_late(lateness)))["violations"] == 0
+
+
+@pytest.mark.parametrize(
+    "limits", [JudgedLimits(may_lose=True), JudgedLimits(in_wall_time=False)], ids=["wire", "clock"]
+)
+def test_where_instants_say_nothing_wall_time_is_recorded_without_judging(limits):
+    told = verdict(at_instants(with_one_late(1 / 60 - 0.001), limits))
+    assert told["violations"] == 0
+    assert not told["judged_in_wall_time"]
+    assert told["commands_too_close"] == 1
+
+
+def test_the_same_word_twice_hides_no_step():
+    host = session()
+    host.play(3.0, swing(0.04, 2 * pi * 0.8))
+    last = swing(0.04, 2 * pi * 0.8)(3.0 - 1 / 60)
+    for _ in range(3):
+        host.now -= 1 / 60 - 0.001
+        host.send(frame(NEW_POSITION, last))
+    assert by_kind(host).keys() <= {"acceleration"}
+    assert verdict(host)["commands_too_close"] == 3

@@ -15,6 +15,10 @@ STEP = 1.05 * 0.5 * PERIOD
 """A leg makes at most so much way from one packet to the next [m]: 0.5 m/s at 60 Hz."""
 ACCELERATION = 8.0 + 2e-3
 """What the judge allows a leg [m/s²]."""
+CLOSEST = 0.8
+"""Packets are never closer [send periods]."""
+WALL_SPEED = 1.25 * 0.5
+"""A leg is never asked for more in wall time [m/s]: 0.5 m/s are the machine's."""
 MOVING = 0.05
 """Slower than this the length of a step says nothing about its time [m/s]."""
 
@@ -72,6 +76,30 @@ def pauses(log: Path) -> list[float]:
     """Times between neighbouring setpoints, sorted, in send periods."""
     gaps = [1e-9 * np.diff(one.at) / PERIOD for one in stretches(log)]
     return sorted(float(gap) for gap in np.concatenate(gaps))
+
+
+def spacings(log: Path) -> list[float]:
+    """Times between neighbouring packets of any kind, sorted, in send periods.
+
+    By the kernel's stamps, where the base that wrote the log has them.
+    """
+    instants = [at for at, _ in read_motion_log(log)]
+    return sorted(1e-9 * (b - a) / PERIOD for a, b in pairwise(instants))
+
+
+def wall_speeds(log: Path) -> list[float]:
+    """Largest leg speed of each step in wall time, by the instants of arrival, sorted [m/s]."""
+    found: list[float] = []
+    for one in stretches(log):
+        times = 1e-9 * np.diff(one.at)
+        found += (np.abs(np.diff(one.words, axis=0)).max(axis=1) / times).tolist()
+    return sorted(found)
+
+
+def assert_apart(log: Path) -> None:
+    """No two packets within a fraction of a period, and no leg faster than allowed for it."""
+    assert spacings(log)[0] >= CLOSEST
+    assert wall_speeds(log)[-1] <= WALL_SPEED
 
 
 def largest_step(log: Path) -> float:

@@ -15,7 +15,18 @@ import pytest
 from far_ends import FarRig
 from process_hands import is_loaded, kill, replaced, rounds
 from rig import assert_soft, until
-from setpoint_log import ACCELERATION, STEP, crossing, largest_step, pauses, spread, stretches
+from setpoint_log import (
+    ACCELERATION,
+    STEP,
+    assert_apart,
+    crossing,
+    largest_step,
+    pauses,
+    spacings,
+    spread,
+    stretches,
+    wall_speeds,
+)
 
 pytestmark = [pytest.mark.campaign, pytest.mark.timeout(7200)]
 SEED = 2014
@@ -71,6 +82,7 @@ def test_kills(tmp_path: Path, name: str) -> None:
         told[key] = verdict[key]
     told["step_mm"] = 1e3 * largest_step(log)
     told["pauses"] = spread(pauses(log))
+    told["spacing_min"], told["wall_speed_max"] = spacings(log)[0], wall_speeds(log)[-1]
     told["faults"] = re.findall(r"-> FAULT: (.*)", text)
     told["holds"] = way.count(("RUN", "HOLD"))
     crossings = []
@@ -85,6 +97,7 @@ def test_kills(tmp_path: Path, name: str) -> None:
     assert_soft(verdict)
     assert verdict["is_parked"]
     assert largest_step(log) < STEP
+    assert_apart(log)
     if name == "planner":
         assert way.count(("PARKING", "PARKED")) >= len(figures)
     else:
@@ -120,6 +133,7 @@ def test_supervisor_kills(tmp_path: Path) -> None:
         assert verdict["is_parked"]
         step = largest_step(folder / "base.log")
         assert step < STEP
+        assert_apart(folder / "base.log")
         one = {"ended_s": took, "acceleration": verdict["acceleration_max"], "step_mm": 1e3 * step}
         one |= {"gap_ms": verdict["gap_ms"]["max"], "speed": verdict["speed_max"]}
         figures.append(one)

@@ -7,7 +7,7 @@ import pytest
 from far_ends import FarRig
 from process_hands import is_loaded
 from rig import ROOT, assert_soft
-from setpoint_log import periods_of_motion
+from setpoint_log import assert_apart, periods_of_motion
 
 FAST = 0.1
 """A leg that is faster shows a sample sent twice [m/s]."""
@@ -59,3 +59,4 @@ def test_a_guard_that_dies_about_a_packet_leaves_no_sample_out_and_sends_none_tw
     # a sample sent twice is a step of nothing, one left out is a step of two periods
     assert 0.5 < min(told) <= max(told) < 1.5
     assert_soft(verdict)
+    assert_apart(tmp_path / "base.log")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from process_hands import kill, replaced
 from rig import Rig, assert_soft, is_alive, until
-from setpoint_log import STEP, largest_step
+from setpoint_log import STEP, assert_apart, largest_step
 
 BACK_TO_PARKED = ("PARKING", "PARKED")
 
@@ -70,6 +70,7 @@ def test_the_spare_goes_on_with_the_same_drive(tmp_path: Path, number: signal.Si
     assert_soft(verdict)
     assert verdict["is_parked"]
     assert largest_step(tmp_path / "base.log") < STEP
+    assert_apart(tmp_path / "base.log")
 
 
 def test_a_killed_supervisor_leaves_a_guard_that_parks_and_ends(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import pytest
 from far_ends import FarRig
 from process_hands import freeze, is_loaded, replaced, rounds
 from rig import assert_soft, is_alive
-from setpoint_log import ACCELERATION, STEP, crossing, largest_step, spread, stretches
+from setpoint_log import ACCELERATION, STEP, assert_apart, crossing, largest_step, spread, stretches
 
 KILL = "stands still; killed"
 CHILDREN = ("guard", "spare", "planner", "web")
@@ -142,6 +142,7 @@ def test_whoever_stands_still_for_a_moment_moves_nothing(tmp_path: Path) -> None
         verdict = rig.verdict()
     assert_soft(verdict)
     assert largest_step(tmp_path / "base.log") < STEP
+    assert_apart(tmp_path / "base.log")
 
 
 @pytest.mark.campaign
@@ -200,4 +201,5 @@ def test_a_process_stands_still_again_and_again(tmp_path: Path, name: str) -> No
     assert_soft(verdict)
     assert verdict["is_parked"]
     assert largest_step(tmp_path / "base.log") < STEP
+    assert_apart(tmp_path / "base.log")
     assert max(one.acceleration for one in crossings) <= ACCELERATION

@@ -82,23 +82,41 @@ def aged(slower_ppm, seconds):
     return found
 
 
-def test_a_clock_that_runs_90_ppm_slow_is_followed_for_hours():
-    # unfollowed it would seem to lag by 300 ms after 55 minutes
-    assert aged(90.0, 7200.0) == {None}
-
-
-def test_a_clock_that_runs_200_ppm_slow_is_not_told_from_a_growing_delay():
-    assert aged(200.0, 2900.0) == {None}
-    assert aged(200.0, 3100.0) == {None, "old"}
+@pytest.mark.parametrize("ppm", [90.0, 200.0, 2000.0])
+def test_a_clock_that_runs_slow_is_followed_for_hours(ppm):
+    # unfollowed 90 ppm would seem to lag by 300 ms after 55 minutes
+    assert aged(ppm, 7200.0) == {None}
 
 
 def test_a_delay_exactly_at_the_patience_is_borne():
+    """Packets held back by a way that stood still for a second: 300 ms is the patience here."""
+
     def later(by_ns):
         gate = Gate()
-        for sequence in (1, 2):
-            assert gate.refuse(*A, motion(1000.0, sequence, sent_ms=1000.0)) is None
-        sent = 1000 * MS - by_ns
-        return gate.refuse(*A, replace(motion(1000.0, 3), sender_ns=sent))
+        for sequence, at in ((1, 0.0), (2, 1000.0)):
+            assert gate.refuse(*A, motion(at, sequence, sent_ms=at)) is None
+        # what may rise by a hundredth of the time that passes has risen by 10 ms
+        sent = 2000 * MS - 10 * MS - by_ns
+        return gate.refuse(*A, replace(motion(2000.0, 3), sender_ns=sent))
 
     assert later(300 * MS) is None
     assert later(300 * MS + 1) == "old"
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch", "is_attitude"),
+    [
+        (float(np.float32(np.pi)), 0.0, True),
+        (-float(np.float32(np.pi)), float(np.float32(np.pi / 2)), True),
+        (3.1417, 0.0, False),
+        (0.0, -1.5709, False),
+        (170.0, 0.0, False),
+        (0.0, 5.0, False),
+        (np.nan, 0.0, False),
+    ],
+)
+def test_an_attitude_beyond_pi_or_half_of_it_is_none(roll, pitch, is_attitude):
+    gate = Gate()
+    refusal = gate.refuse(*A, motion(attitude=(roll, pitch)))
+    assert refusal == (None if is_attitude else "out-of-range")
+    assert ("degrees" in gate.last_refusal) is not is_attitude

@@ -195,6 +195,10 @@ def test_a_decoder_of_its_own_for_each_sender() -> None:
     assert source.formats["a"] is not source.formats["b"]
 
 
+def plain_at(sequence: int, now: int) -> bytes:
+    return encode_cue(Cue(1, sequence, 0, now, MOTION))
+
+
 def signed(sequence: int, key: bytes | None, x: float = 1.0) -> bytes:
     motion = Motion((x, 0.0, 0.0), (0.0, 0.0, 0.0))
     cue = Cue(1, sequence, 0, 10 * sequence * MS, motion)
@@ -210,6 +214,27 @@ def test_what_a_wire_damages_is_not_the_owners_fault(key: bytes | None) -> None:
         inputs.poll()
     assert inputs.vehicle.is_fresh(490 * MS)
     assert inputs.counters["refused_size"] == 50
+
+
+def test_a_count_that_begins_anew_in_the_midst_is_a_teleport() -> None:
+    inputs, wire = room()
+    modes = []
+    for k, sequence in enumerate([*range(500, 520), *range(20)]):
+        wire.waiting = [(plain_at(sequence, 10 * k * MS), "own", 10 * k * MS)]
+        modes += [motion.mode for motion in inputs.poll()[0]]
+    assert modes == [DriveMode.DRIVE] * 20 + [DriveMode.TELEPORT] + [DriveMode.DRIVE] * 17
+    assert inputs.counters["refused_reordered"] == 2
+
+
+def test_an_attitude_in_degrees_is_refused_with_the_question() -> None:
+    inputs, wire = room()
+    for attitude, word in (((170.0, 0.0), "roll 170 rad"), ((0.0, 5.0), "pitch 5 rad")):
+        told = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), attitude, None, 0.0)
+        wire.waiting = [(encode_cue(Cue(1, 1, 0, 0, told)), "own", 0)]
+        assert inputs.poll() == ([], [])
+        assert word in inputs.last_error
+        assert "is it in degrees?" in inputs.last_error
+    assert inputs.counters["refused_out_of_range"] == 2
 
 
 @pytest.mark.parametrize("size", [92, 96])

@@ -6,8 +6,19 @@ import itertools
 from collections import deque
 from typing import Final
 
+LEAST_HZ: Final = 5.0
+"""Packets per second below which nothing can be driven [Hz]: 300 ms is the longest patience."""
 MS: Final = 1_000_000
 SECOND_NS: Final = 1_000_000_000
+_JITTER: Final = 1.1
+"""So much longer than at the least rate a usual gap may be [-]."""
+_SLOW_GAPS: Final = 8
+"""Gaps in which a slow source is recognised."""
+
+
+def stale_after_ns(interval_ns: int) -> int:
+    """Age beyond which a source of this interval is stale [ns]."""
+    return max(50 * MS, 3 * interval_ns)
 
 
 class Freshness:
@@ -22,6 +33,20 @@ class Freshness:
         """Begin without an arrival; somebody looks every ``look_ns`` [ns]."""
         self._shortest = max(5 * MS, look_ns)
         self._arrivals: deque[int] = deque(maxlen=1024)
+        self._gaps: deque[int] = deque(maxlen=_SLOW_GAPS)
+
+    @property
+    def is_too_slow(self) -> bool:
+        """True if the source sends steadily, and too rarely to drive anything."""
+        return len(self._gaps) >= 3 and LEAST_HZ * self.usual_gap() > _JITTER
+
+    def usual_gap(self) -> float:
+        """Median time between the last few packets, however long ago they came [s]; at least 1 us.
+
+        Of an outage in a quick stream nothing is seen here.
+        """
+        gaps = sorted(self._gaps) or [0]
+        return max(1e-6, gaps[len(gaps) // 2] / SECOND_NS)
 
     @property
     def newest_ns(self) -> int | None:
@@ -30,6 +55,8 @@ class Freshness:
 
     def arrived(self, now_ns: int) -> None:
         """Note a packet that was believed."""
+        if self._arrivals:
+            self._gaps.append(now_ns - self._arrivals[-1])
         self._arrivals.append(now_ns)
         while now_ns - self._arrivals[0] > SECOND_NS:
             self._arrivals.popleft()
@@ -44,7 +71,7 @@ class Freshness:
 
     def stale_after_ns(self) -> int:
         """Age beyond which the source is stale [ns]."""
-        return max(50 * MS, 3 * self.interval_ns())
+        return stale_after_ns(self.interval_ns())
 
     def age_ns(self, now_ns: int) -> int | None:
         """Age of the newest packet [ns]; None before the first."""

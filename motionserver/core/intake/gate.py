@@ -6,26 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-
-from motionserver.core.axes import GRAVITY, Array
-from motionserver.core.intake.freshness import SECOND_NS, Freshness
+from motionserver.core.intake.freshness import SECOND_NS, Freshness, stale_after_ns
 from motionserver.core.intake.plausibility import Plausibility
+from motionserver.core.intake.ranges import out_of_range
+from motionserver.core.intake.sender_clock import SenderClock
+from motionserver.core.intake.sequence_order import SequenceOrder
 from motionserver.core.intake.spoilage import Spoilage
 from motionserver.core.state import DriveMode, VehicleMotion
 
 REORDER_NS: Final = 2 * SECOND_NS
-"""Silence after which an owner may be replaced [ns]."""
-IMPLAUSIBLE_FORCE: Final = 10.0 * GRAVITY
-"""Specific force no road vehicle survives: the packet is not believed [m/s2]."""
-IMPLAUSIBLE_RATE: Final = np.radians(4000.0)
-"""Body rate beyond every vehicle: the packet is not believed [rad/s]."""
-FASTEST: Final = 1000.0
-"""Speed beyond every vehicle: the packet is not believed [m/s]."""
-FARTHEST: Final = 60.0
-"""A preview beyond this is not believed [s]."""
-_LEAK: Final = 100e-6
-"""Upward drift of the least delay, so that a slow sender clock is followed [s/s]."""
+"""Silence after which an owner may be replaced, and its order is forgotten [ns]."""
+_MARGIN: Final = 3.0
+"""Packets that a gap may have lost, in those that usually come in its time [-]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +30,13 @@ class Owner:
 
 
 class Gate:
-    """Believe or refuse packets of one input, one owner at a time."""
+    """Believe or refuse packets of one input, one owner at a time.
+
+    Attributes:
+        owner: Who is believed; None before the first packet.
+        mode: What the owner says it is doing.
+        last_refusal: What was wrong with the newest packet that was out of range.
+    """
 
     def __init__(
         self, may_change_owner: Callable[[], bool] = lambda: True, look_ns: int = 0
@@ -51,7 +49,8 @@ class Gate:
         """
         self._look_ns = look_ns
         self.mode = DriveMode.DRIVE
-        self.lost = 0
+        self.last_refusal = ""
+        self.order = SequenceOrder()
         self._may_change_owner = may_change_owner
         self._hand_over(None)
 
@@ -61,9 +60,18 @@ class Gate:
         self.freshness = Freshness(self._look_ns)
         self.spoilage = Spoilage()
         self.plausibility = Plausibility()
-        self._sequence: int | None = None
-        # least delay [ns], let drift since its instant [ns]
-        self._quickest: tuple[float, int] | None = None
+        self.clock = SenderClock()
+        self.order.forget()
+
+    @property
+    def lost(self) -> int:
+        """Sequence numbers that never came."""
+        return self.order.lost
+
+    @property
+    def is_restart(self) -> bool:
+        """True if the packet just believed begins a new count: what came before ended."""
+        return self.order.is_restart
 
     def refuse(self, source: str, address: str, motion: VehicleMotion) -> str | None:
         """Judge a packet.
@@ -75,31 +83,34 @@ class Gate:
 
         Returns:
             None if it is believed (and noted), else the name of the counter of the refusal:
-            "second-client", "replayed", "reordered", "old", "out-of-range".
+            "second-client", "replayed", "reordered", "jumped", "old", "out-of-range".
         """
         who = Owner(source, address, motion.session)
         now = motion.arrival_ns
-        silent = self._is_silent(now)
-        if who != self.owner:
-            if not self._may_own(now):
-                return "second-client"
-        elif (order := self._order(motion)) is not None:
-            return order
-        if not _is_plausible(motion):
+        is_owner = who == self.owner
+        refusal = None
+        if is_owner:
+            if self._is_silent(now):
+                self._forget_order()
+            refusal = self._out_of_order(motion)
+        elif not self._may_own(who, now):
+            return "second-client"
+        if wrong := out_of_range(motion):
+            self.last_refusal = wrong
             self.spoilt(source, address, now)
             return "out-of-range"
-        if who != self.owner:
+        if refusal is not None:
+            return refusal
+        if not is_owner:
             self._hand_over(who)
-        elif silent:
-            # a longer way or a sender's clock that stood still: the delay is learnt anew
-            self._quickest = None
-        elif self._is_old(motion):
-            return "old"
-        if motion.sequence is not None and self._sequence is not None:
-            self.lost += max(0, ((motion.sequence - self._sequence) & 0xFFFFFFFF) - 1)
-        self._sequence = motion.sequence
+            self._out_of_order(motion)
+        fresh = self.freshness
+        if motion.sender_ns is not None:
+            interval = fresh.interval_ns()
+            if self.clock.is_late(now, motion.sender_ns, interval, stale_after_ns(interval)):
+                return "old"
         self.mode = motion.mode
-        self.freshness.arrived(now)
+        fresh.arrived(now)
         self.spoilage.heard(now, is_bad=False)
         if motion.mode is DriveMode.DRIVE:
             self.plausibility.heard(motion)
@@ -113,22 +124,29 @@ class Gate:
     def believed_ns(self, now_ns: int, is_cued: bool) -> int:
         """Arrival of the newest packet that may move the platform [ns]; 0 = none.
 
-        What comes from an owner whose packets are spoilt is told as what never came; so is what
-        seems to have wrong units, but that only keeps a drive from beginning.
+        What comes from an owner whose packets are spoilt or too rare is told as what never came;
+        so is what seems to have wrong units, but that only keeps a drive from beginning.
 
         Args:
             now_ns: Now [ns].
-            is_cued: Whether the platform is up and cued.
+            is_cued: Whether a drive has begun.
         """
-        if self.spoilage.is_spoilt(now_ns) or (not is_cued and self.plausibility.complaint()):
+        if self.spoilage.is_spoilt(now_ns) or self.freshness.is_too_slow:
+            return 0
+        if not is_cued and self.plausibility.complaint():
             return 0
         return self.freshness.newest_ns or 0
 
     def is_fresh(self, now_ns: int) -> bool:
         """True if the owner's packets arrive in time, and nearly all of them can be believed."""
-        return not self.freshness.is_stale(now_ns) and not self.spoilage.is_spoilt(now_ns)
+        fresh = self.freshness
+        return not (fresh.is_stale(now_ns) or fresh.is_too_slow or self.spoilage.is_spoilt(now_ns))
 
-    def _may_own(self, now_ns: int) -> bool:
+    def is_silent(self, now_ns: int) -> bool:
+        """True if the owner has said nothing for so long that another may take its place."""
+        return self._is_silent(now_ns)
+
+    def _may_own(self, who: Owner, now_ns: int) -> bool:
         if self.owner is None:
             return True
         left = self.mode is DriveMode.BYE or self._is_silent(now_ns)
@@ -138,41 +156,17 @@ class Gate:
         age = self.freshness.age_ns(now_ns)
         return age is None or age > REORDER_NS
 
-    def _order(self, motion: VehicleMotion) -> str | None:
-        if motion.sequence is None or self._sequence is None:
-            return None
-        ahead = (motion.sequence - self._sequence) & 0xFFFFFFFF
-        if ahead == 0:
-            return "replayed"
-        return "reordered" if ahead >= 1 << 31 else None
+    def _forget_order(self) -> None:
+        """After a silence the sender may be another run of itself, on another way."""
+        self.order.forget()
+        self.clock.forget()
+        self.plausibility = Plausibility()
 
-    def _is_old(self, motion: VehicleMotion) -> bool:
-        """Delayed beyond the stale limit against the least delay seen: a burst after a stall."""
-        if motion.sender_ns is None:
-            return False
-        offset = float(motion.arrival_ns - motion.sender_ns)
-        least = offset
-        if self._quickest is not None:
-            before, at_ns = self._quickest
-            least = min(before + (motion.arrival_ns - at_ns) * _LEAK, offset)
-        self._quickest = (least, motion.arrival_ns)
-        return offset - least > self.freshness.stale_after_ns()
-
-
-def _is_plausible(motion: VehicleMotion) -> bool:
-    """False for what no vehicle does, for what is no number, for a future that is none."""
-    if not (_is_within(motion.force, motion.rates) and abs(motion.speed) <= FASTEST):
-        return False
-    preview = motion.preview
-    if preview is None:
-        return True
-    times = preview.times
-    ahead = bool(times[0] >= 0.0 and times[-1] <= FARTHEST and np.all(np.diff(times) > 0.0))
-    return ahead and _is_within(preview.force, preview.rates)
-
-
-def _is_within(force: Array, rates: Array) -> bool:
-    # asked so that a NaN is outside
-    return bool(
-        np.all(np.abs(force) <= IMPLAUSIBLE_FORCE) and np.all(np.abs(rates) <= IMPLAUSIBLE_RATE)
-    )
+    def _out_of_order(self, motion: VehicleMotion) -> str | None:
+        fresh, stamp = self.freshness, motion.sender_ns
+        gap_ns = fresh.age_ns(motion.arrival_ns) or 0
+        expected = _MARGIN * fresh.rate_hz() * gap_ns / SECOND_NS
+        refusal = self.order.judge(motion.sequence, expected, self.clock.is_older(stamp))
+        if self.order.is_restart:
+            self.clock.forget()
+        return refusal

@@ -1,4 +1,4 @@
-"""Are the units right? Forces told in g and rates told in degrees look like no vehicle for long."""
+"""Are units and signs right? What looks like no vehicle keeps a drive from beginning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import GRAVITY
+from motionserver.core.intake.agreement import Agreement
 from motionserver.core.intake.freshness import MS, SECOND_NS
+from motionserver.core.intake.standstill import StandstillForce
 from motionserver.core.state import VehicleMotion
 
 SPAN: Final = 10
@@ -24,13 +26,17 @@ _EVERY_NS: Final = 100 * MS
 
 
 class Plausibility:
-    """Medians of what the owner told in the last seconds."""
+    """What the owner told in the last seconds: at standstill, in the median, against itself."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[int, float, float]] = deque(maxlen=SPAN * SECOND_NS // _EVERY_NS)
+        self._standstill = StandstillForce()
+        self._agreement = Agreement()
 
     def heard(self, motion: VehicleMotion) -> None:
         """Note a packet; ten a second are enough."""
+        self._standstill.heard(motion)
+        self._agreement.heard(motion)
         now = motion.arrival_ns
         if self._seen and now - self._seen[-1][0] < _EVERY_NS:
             return
@@ -39,6 +45,9 @@ class Plausibility:
 
     def complaint(self) -> str:
         """What is wrong, and what it may be; empty if nothing is, or too little was heard."""
+        return self._standstill.complaint or self._of_medians() or self._agreement.complaint
+
+    def _of_medians(self) -> str:
         if len(self._seen) < LEAST * SECOND_NS // _EVERY_NS:
             return ""
         force = median(one[1] for one in self._seen)

@@ -18,6 +18,7 @@ from motionserver.telemetry.blackbox.watch import Watch
 from motionserver.telemetry.link import GuardClock
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.signals import ignore_signals, let_through
 
 POLL: Final = 0.1
 """Pause between two looks [s]; nothing is lost meanwhile."""
@@ -36,6 +37,8 @@ def main() -> int:
     # also sent to all processes at once, and while the service's last threads still live: whether
     # the service has died is asked, not concluded
     signal.signal(signal.SIGTERM, lambda *_: None)
+    ignore_signals(but=(signal.SIGINT, signal.SIGTERM))
+    let_through()
     parent = os.getppid()
     follow_parent()
     with contextlib.suppress(OSError):

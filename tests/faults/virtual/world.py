@@ -187,7 +187,6 @@ class World:
             lambda instant: self.at(instant + LATE_NS, lambda: self._wake_guard(mine))
         )
         loop._begin(self.now)
-        loop._ticker.arm(int(loop._start_ns + (loop._tick + 1) * loop._tick_ns))
 
     def kill_guard(self):
         self._guards += 1
