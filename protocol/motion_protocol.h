@@ -1,4 +1,4 @@
-/* The cue protocol, version 1.0, sender side: README.md beside this file is the contract.
+/* The cue protocol, version 1.1, sender side: README.md beside this file is the contract.
  *
  * C11 or C++11, this header only, no allocation, any byte order of the host.
  *
@@ -28,6 +28,7 @@
 #define MOTION_CUE_CRC_SEED 0x1BA023E3u
 #define MOTION_STATUS_CRC_SEED 0x076E0CACu
 #define MOTION_PREVIEW_MAX 40
+#define MOTION_NOTICE_TEXT_MAX 240
 
 enum motion_mode { MOTION_DRIVE = 0, MOTION_PAUSE = 1, MOTION_TELEPORT = 2, MOTION_BYE = 3 };
 
@@ -58,7 +59,17 @@ enum motion_block {
   MOTION_BLOCK_MOTION = 1,
   MOTION_BLOCK_PREVIEW = 2,
   MOTION_BLOCK_DRIVER = 3,
-  MOTION_BLOCK_STATUS = 64
+  MOTION_BLOCK_STATUS = 64,
+  MOTION_BLOCK_NOTICE = 65
+};
+
+/* What the server finds wrong with this client's cues; unknown bits may be set. */
+enum motion_notice {
+  MOTION_NOTICE_SENDER_TIME = 0x0001,
+  MOTION_NOTICE_TOO_SLOW = 0x0002,
+  MOTION_NOTICE_VALUES = 0x0004,
+  MOTION_NOTICE_OUT_OF_RANGE = 0x0008,
+  MOTION_NOTICE_BAD_SHARE = 0x0010
 };
 
 enum motion_state {
@@ -112,6 +123,11 @@ typedef struct {
   float scale;
   uint8_t state, reserved[3];
 } motion_wire_status;
+
+typedef struct {
+  uint16_t kinds;
+  uint8_t reserved[2];
+} motion_wire_notice; /* followed by the text, UTF-8 up to the end of the block */
 #pragma pack(pop)
 
 /* What to send. All zero is a standing vehicle of which nothing else is known. */

@@ -5,21 +5,28 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Final, Protocol
+from dataclasses import replace
+from typing import Final
 
 from motionserver.core.intake.gate import REORDER_NS, Gate, Owner
 from motionserver.core.state import DriveMode, VehicleMotion
-from motionserver.planner.crowd import Crowd
-from motionserver.planner.options import InputOptions
 from motionserver.planner.preview import PreviewInlet
 from motionserver.planner.session_file import SessionKeeper
-from motionserver.sources.base import OtherStreamError, SourceError, SourceFormat
-from motionserver.sources.registry import make_source
-from motionserver.sources.sizes import sizes_of
-from motionserver.sources.udp import UdpInput
-from motionserver.sources.zenoh_input import ZenohInput, link_of
+from motionserver.planner.source_input import (
+    MOST_SENDERS,
+    Datagrams,
+    Input,
+    RefusedClient,
+    Transport,
+    open_input,
+)
+from motionserver.sources.base import OtherStreamError, SourceError
 from motionserver.telemetry.ticker import now_ns
+
+__all__ = [
+    "MOST_SENDERS", "SHOWN_ERRORS", "Datagrams", "Input", "Inputs", "RefusedClient", "Transport",
+    "is_there", "open_input",
+]  # fmt: skip
 
 log = logging.getLogger("motionserver.planner")
 SHOWN_ERRORS = 5
@@ -28,78 +35,12 @@ HINTS: Final = {
     "new session number"
 }
 """What is said of a refusal beside its name."""
-MOST_SENDERS = 8
-"""Senders per input whose format is remembered; more are strangers, and start anew."""
-
+PAUSE_NS: Final = 600_000_000_000
+"""Longest silence that is taken for a pause, of formats that pause by silence [ns]."""
 
 DAMAGED = {"size", "magic", "byte_order", "version", "incompat", "length", "checksum"}
 DAMAGED |= {"hmac_missing", "hmac_wrong", "hmac_unexpected"}
 """Refusals of packets that are not as the owner sent them: a bad wire, or somebody in his name."""
-Datagrams = list[tuple[bytes, str, int]]
-"""Bytes, sender, arrival [ns]."""
-
-
-class Transport(Protocol):
-    """Where datagrams come from."""
-
-    def drain(self) -> Datagrams:
-        """Datagrams that wait: bytes, sender, arrival [ns]."""
-        ...
-
-    def reply(self, name: str, data: bytes) -> None:
-        """Send to a sender."""
-        ...
-
-    def close(self) -> None:
-        """Stop."""
-        ...
-
-
-@dataclass(slots=True)
-class Input:
-    """One source: transport, a decoder for each sender, name; previews on a way of their own."""
-
-    options: InputOptions
-    transport: Transport
-    formats: dict[str, SourceFormat] = field(default_factory=dict)
-    drain_previews: Callable[[], Datagrams] = list
-    crowd: Crowd | None = None
-
-    @property
-    def name(self) -> str:
-        """How it is shown."""
-        return f"{self.options.kind} {self.options.host}:{self.options.port}"
-
-    def decode(self, data: bytes, address: str, arrival_ns: int) -> VehicleMotion:
-        """Read a datagram; what a format remembers of a sender, another sender cannot touch.
-
-        Raises:
-            SourceError: The bytes are no sample.
-        """
-        if address not in self.formats:
-            while len(self.formats) >= MOST_SENDERS:
-                del self.formats[next(iter(self.formats))]
-            self.formats[address] = make_source(self.options.kind, self.options.key)
-        return self.formats[address].decode(data, arrival_ns)
-
-
-def open_input(options: InputOptions) -> Input:
-    """Open one input.
-
-    Raises:
-        OSError: The address cannot be bound.
-        ConfigError: The kind is unknown.
-    """
-    make_source(options.kind, options.key)
-    if options.kind == "zenoh":
-        file = options.zenoh_config
-        endpoint = f"{link_of(file)}/{options.host}:{options.port}"
-        transport = ZenohInput(
-            options.topic, [endpoint], list(options.connect), options.preview_topic, file
-        )
-        return Input(options, transport, drain_previews=transport.drain_previews)
-    link = UdpInput(options.host, options.port)
-    return Input(options, link, crowd=Crowd(link.socket, sizes_of(options.kind)))
 
 
 def is_there(gate: Gate, now_ns: int) -> bool:
@@ -133,11 +74,12 @@ class Inputs:
         """
         self.inputs = inputs
         self._sessions = sessions
-        self.vehicle = Gate(may_change_owner, look_ns)
+        self.vehicle = Gate(may_change_owner, look_ns, self._is_same_game)
         self.sensor = Gate(look_ns=look_ns)
         self.previews = PreviewInlet()
         self.counters: Counter[str] = Counter()
         self.owner_input: Input | None = None
+        self.out_of_range: RefusedClient | None = None
         self.last_error = ""
 
     def poll(self) -> tuple[list[VehicleMotion], list[VehicleMotion]]:
@@ -171,6 +113,7 @@ class Inputs:
                     said = HINTS.get(refusal, refusal)
                     if refusal == "out-of-range":
                         said = f"out-of-range: {gate.last_refusal}"
+                        self._note_values(source, address, motion, gate)
                     self._refused(refusal, f"{source.name} from {address}: {said}")
                 elif motion.at_platform:
                     sensor.append(motion)
@@ -203,6 +146,34 @@ class Inputs:
         source.crowd.saw(heard, [_peer(name) for name in sorted(owners)], now)
         if source.crowd.dropped > before:
             self.counters["dropped_by_kernel"] += source.crowd.dropped - before
+
+    def _note_values(self, source: Input, address: str, motion: VehicleMotion, gate: Gate) -> None:
+        """Keep what was wrong, to be told to the client; a stranger beside an owner is not."""
+        owner = gate.owner
+        is_owner = owner is not None and owner == Owner(source.name, address, motion.session)
+        if gate is self.vehicle and (is_owner or not is_there(gate, motion.arrival_ns)):
+            self.out_of_range = RefusedClient(source, address, motion, gate.last_refusal)
+
+    def is_paused_by_silence(self, now_ns: int) -> bool:
+        """True if the owner's format says "pause" by sending nothing, and that is what it does."""
+        age = self.vehicle.freshness.age_ns(now_ns)
+        return (
+            self.owner_input is not None
+            and self.owner_input.pauses_by_silence
+            and age is not None
+            and age <= PAUSE_NS
+            and self.vehicle.mode is DriveMode.DRIVE
+            and self.vehicle.freshness.is_stale(now_ns)
+            and not self.vehicle.freshness.is_too_slow
+            and not self.vehicle.spoilage.is_spoilt(now_ns)
+        )
+
+    def _is_same_game(self, owner: Owner, who: Owner) -> bool:
+        """Whether a newcomer is a paused owner that returns on another port of its host."""
+        if owner.source != who.source or self.owner_input is None:
+            return False
+        same_host = owner.address.rpartition(":")[0] == who.address.rpartition(":")[0]
+        return self.owner_input.pauses_by_silence and same_host
 
     @property
     def filters(self) -> dict[str, str]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from motion_protocol import encode_status
 
 from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.intake.intake import Head, Intake
@@ -25,10 +24,11 @@ from motionserver.cueing.tuning import Tuning
 from motionserver.planner.handover import Handover, HandoverClock
 from motionserver.planner.inputs import Inputs, open_input
 from motionserver.planner.options import PlannerOptions
-from motionserver.planner.reply import status_packet
+from motionserver.planner.reply import StatusSender
 from motionserver.planner.session_file import keeper_of
 from motionserver.planner.show import PlannerView, Timing
 from motionserver.planner.sides import Sides
+from motionserver.planner.source_notices import NoticeLog, notices_of
 from motionserver.planner.source_report import SourceReport
 from motionserver.planner.tuner import Tuner
 from motionserver.planner.wake import next_wake
@@ -43,7 +43,8 @@ from motionserver.telemetry.signals import let_through
 from motionserver.telemetry.ticker import Ticker, now_ns, ticks_per_send
 
 SECOND: Final = 1_000_000_000
-STATUS_NS: Final = 100_000_000
+BEGUN: Final = frozenset({State.RUN, State.HOLD})
+"""States of a drive that has begun."""
 SNAPSHOT_NS: Final = 30_000_000
 UP: Final = frozen([0.0, 0.0, GRAVITY])
 
@@ -71,6 +72,8 @@ class PlannerLoop:
             int(options.period * SECOND),
         )
         self._source_report = SourceReport(self._inputs)
+        self._replies = StatusSender(self._inputs)
+        self._notice_log = NoticeLog(log)
         self._intake = Intake()
         self._measured = MeasuredForce()
         self._measured_ns = 0
@@ -85,7 +88,6 @@ class PlannerLoop:
         self._ahead = WakeAhead(
             int(options.budget * SECOND), int(options.period * SECOND), self._check_ns
         )
-        self._status_ns = 0
         self._snapshot_ns = 0
         self._ticker: Ticker | None = None
         self._due_ns = 0
@@ -146,7 +148,7 @@ class PlannerLoop:
             self._intake.offer(motion)
         self._state = self._clock.read(now)
         gate = self._inputs.vehicle
-        status = self._source_report.status(now, self._state in CUED)
+        status = self._source_report.status(now, self._state in BEGUN)
         self._maps.cue.write(pack_cue(status, now))
         tuning = self._thinker.tuning
         wanted = self._state is State.RUN and gate.is_fresh(now)
@@ -272,16 +274,8 @@ class PlannerLoop:
         return None
 
     def _status(self, now: int) -> None:
-        """Answer the owner ten times a second, with its own time echoed."""
-        gate, counters = self._inputs.vehicle, self._inputs.counters
-        echo = self._intake.newest
-        if now - self._status_ns < STATUS_NS or echo is None or echo.sender_ns is None:
-            return
-        if gate.freshness.is_stale(now) or gate.owner is None:
-            return
-        self._status_ns = now
-        state = State.OFFLINE if self._state is None else self._state
+        """Answer the owner, and write to the log what is wrong with its packets."""
+        notices = notices_of(self._inputs, now)
+        self._notice_log.note(now, notices)
         scale = self._intake.gain * self._thinker.tuning.scale
-        packet = status_packet(gate, counters, echo, state, scale)
-        self._inputs.reply(encode_status(packet, self._inputs.owner_key))
-        counters["status_sent"] += 1
+        self._replies.send(now, self._intake.newest, self._state, scale, notices)

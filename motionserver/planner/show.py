@@ -16,6 +16,7 @@ from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
 from motionserver.planner.inputs import Inputs
 from motionserver.planner.sides import Sides
+from motionserver.planner.source_notices import notices_of
 from motionserver.planner.spare_time import KEPT, expected_ns
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.ticker import Lateness
@@ -144,6 +145,8 @@ class PlannerView:
         """Write everything as JSON."""
         thought, gate = self._thought, inputs.vehicle
         age = gate.freshness.age_ns(now_ns)
+        notices = [one.text for one in notices_of(inputs, now_ns)]
+        is_paused = inputs.is_paused_by_silence(now_ns)
         proposal = None if thought is None else thought.proposal
         report = None if thought is None else thought.report
         x_max = thinker.tuning.box if report is None else report.x_max
@@ -173,10 +176,11 @@ class PlannerView:
                 "session": None if gate.owner is None else gate.owner.session,
                 "age_s": None if age is None else round(age / 1e9, 4),
                 "rate_hz": round(gate.freshness.rate_hz(), 2),
-                "mode": gate.mode.name.lower(),
+                "mode": "pause" if is_paused else gate.mode.name.lower(),
                 "fresh": gate.is_fresh(now_ns),
                 "bad_share": round(gate.spoilage.share(now_ns), 3),
-                "last_error": (gate.plausibility.complaint() or inputs.last_error)[:300],
+                "notices": notices,
+                "last_error": ("; ".join(notices) or inputs.last_error)[:300],
                 "filters": inputs.filters,
             },
             "solver": {

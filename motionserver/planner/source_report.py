@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
+from motion_protocol import Notices
+
 from motionserver.core.intake.freshness import SECOND_NS
 from motionserver.core.safety.watchdog import CueStatus
+from motionserver.core.state import DriveMode
 from motionserver.planner.inputs import Inputs
+from motionserver.planner.source_notices import notices_of
 
 _REFUSED_NS: Final = 2 * SECOND_NS
 """How long a refusal explains why no packet is accepted [ns]."""
@@ -25,9 +29,14 @@ class SourceReport:
 
         Args:
             now_ns: When the inputs were read [ns].
-            is_cued: Whether the platform is up and cued.
+            is_cued: Whether a drive has begun: the platform is cued or holds.
         """
         gate = self._inputs.vehicle
+        if is_cued and self._inputs.is_paused_by_silence(now_ns):
+            # the game keeps its pause by sending nothing; while we look at it, it is no lost client
+            newest, heard = now_ns, gate.freshness.newest_ns or 0
+            limit = gate.freshness.stale_after_ns()
+            return CueStatus(newest, limit, DriveMode.PAUSE, heard, "", now_ns)
         refused = self._inputs.counters["refused"]
         if refused != self._refused[0]:
             self._refused = (refused, now_ns)
@@ -46,9 +55,9 @@ class SourceReport:
         if gate.spoilage.is_spoilt(now_ns):
             share = gate.spoilage.share(now_ns)
             return f"{share:.0%} of the simulator's packets in the last second are bad; {last}"
-        complaint = "" if is_cued else gate.plausibility.complaint()
-        if complaint:
-            return complaint
+        for one in notices_of(self._inputs, now_ns):
+            if one.kind is Notices.TOO_SLOW or (one.kind is Notices.VALUES and not is_cued):
+                return one.text
         if gate.freshness.is_stale(now_ns) and refused and now_ns - seen_ns <= _REFUSED_NS:
             return f"packets arrive and are refused; {last}"
         return ""

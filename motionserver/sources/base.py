@@ -32,6 +32,10 @@ class SourceFormat(Protocol):
 
     Axes, signs and gravity of a format are proven by the physics of at least one packet captured
     from its simulator; an encoder of our own would only mirror what the decoder assumes.
+
+    A format without a pause of its own, whose game sends nothing while it stands, has an
+    attribute ``pauses_by_silence = True``: its silence in a drive holds the platform at rest as
+    long as a pause, and the drive goes on when packets return. Without it silence is a lost client.
     """
 
     name: str

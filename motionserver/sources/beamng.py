@@ -34,6 +34,7 @@ class BeamNgSource:
     """
 
     name = "beamng"
+    pauses_by_silence = True
 
     def __init__(self) -> None:
         self._last: tuple[int, tuple[float, ...]] | None = None

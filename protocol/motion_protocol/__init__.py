@@ -25,7 +25,14 @@ from .errors import (
 )
 from .framing import MAX_DATAGRAM, VERSION
 from .sequence import sequence_delta
-from .status import PlatformState, Status, decode_status, encode_status
+from .status import (
+    NOTICE_TEXT_MAX,
+    Notices,
+    PlatformState,
+    Status,
+    decode_status,
+    encode_status,
+)
 
 DEFAULT_PORT = 4600
 """UDP port on which the server takes cues unless configured otherwise."""
@@ -33,6 +40,7 @@ DEFAULT_PORT = 4600
 __all__ = [
     "DEFAULT_PORT",
     "MAX_DATAGRAM",
+    "NOTICE_TEXT_MAX",
     "PREVIEW_MAX",
     "VERSION",
     "BlockDuplicateError",
@@ -55,6 +63,7 @@ __all__ = [
     "Mode",
     "Motion",
     "NotFiniteError",
+    "Notices",
     "PlatformState",
     "Preview",
     "ProtocolError",

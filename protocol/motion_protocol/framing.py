@@ -112,8 +112,11 @@ def close_frame(
     sequence: int,
     sim_time_ns: int,
     sender_time_ns: int,
+    minor: int = VERSION[1],
 ) -> bytes:
     """Write header, payload and, with a key, the signature.
+
+    A packet bears the oldest minor version that describes all it contains.
 
     Raises:
         SizeError: The packet would exceed `MAX_DATAGRAM`.
@@ -127,7 +130,7 @@ def close_frame(
             f"send fewer preview samples"
         )
     head = HEADER.pack(
-        kind.magic, *VERSION, incompat, 0, len(payload), flags, mode,
+        kind.magic, VERSION[0], minor, incompat, 0, len(payload), flags, mode,
         session, sequence, sim_time_ns, sender_time_ns, 0,
     )[:_CRC_OFFSET]  # fmt: skip
     crc = zlib.crc32(payload, zlib.crc32(head, kind.crc_seed))

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from typing import Any, Final
 
-from .errors import BlockDuplicateError, BlockLengthError, BlockMissingError, UnknownValueError
+from .errors import (
+    BlockDuplicateError,
+    BlockLengthError,
+    BlockMissingError,
+    FieldError,
+    UnknownValueError,
+)
 from .framing import block, blocks, close_frame, kind, open_frame
 from .layout import Layout
 
@@ -28,6 +34,30 @@ BODY: Final = Layout(
         ("", "3x"),
     ),
 )
+
+
+NOTICE: Final = 65
+NOTICE_MINOR: Final = 1
+"""Minor version that brought the notice block."""
+NOTICE_HEAD: Final = Layout("notice", (("kinds", "H"), ("", "2x")))
+NOTICE_TEXT_MAX: Final = 240
+"""Longest text of a notice [bytes of UTF-8]."""
+
+
+class Notices(IntFlag):
+    """What the server finds wrong with this client's cues. Unknown bits may be set."""
+
+    NONE = 0
+    SENDER_TIME = 0x0001
+    """The sender time is no clock in nanoseconds; it is ignored."""
+    TOO_SLOW = 0x0002
+    """Too few packets a second to drive a platform."""
+    VALUES = 0x0004
+    """Values contradict one another, or what a vehicle that stands feels: no drive begins."""
+    OUT_OF_RANGE = 0x0008
+    """Packets are refused because of a value beyond its range."""
+    BAD_SHARE = 0x0010
+    """So many packets are bad that the others do not count either."""
 
 
 class PlatformState(IntEnum):
@@ -65,6 +95,8 @@ class Status:
         rejected: Cues of this session that were refused.
         scale: Scale applied to the motion now, 0 to 1.
         state: The platform's motion state.
+        notices: What the server finds wrong with this client's cues.
+        notice_text: The same in a sentence, at most `NOTICE_TEXT_MAX` bytes of UTF-8.
     """
 
     session: int
@@ -80,6 +112,8 @@ class Status:
     rejected: int
     scale: float
     state: PlatformState
+    notices: Notices = Notices.NONE
+    notice_text: str = ""
 
 
 def encode_status(status: Status, key: bytes | None = None) -> bytes:
@@ -89,6 +123,7 @@ def encode_status(status: Status, key: bytes | None = None) -> bytes:
         NotFiniteError: The scale is NaN or infinite.
         FieldError: A value does not fit its field.
     """
+    has_notice = bool(status.notices or status.notice_text)
     body = BODY.pack(
         status.echo_sender_time_ns,
         status.receive_time_ns,
@@ -102,8 +137,9 @@ def encode_status(status: Status, key: bytes | None = None) -> bytes:
     )
     return close_frame(
         STATUS_KIND,
-        block(STATUS, body),
+        block(STATUS, body) + (_notice(status) if has_notice else b""),
         key,
+        minor=NOTICE_MINOR if has_notice else 0,
         flags=0,
         mode=0,
         session=status.session,
@@ -111,6 +147,16 @@ def encode_status(status: Status, key: bytes | None = None) -> bytes:
         sim_time_ns=status.sim_time_ns,
         sender_time_ns=status.send_time_ns,
     )
+
+
+def _notice(status: Status) -> bytes:
+    text = status.notice_text.encode()
+    if len(text) > NOTICE_TEXT_MAX:
+        raise FieldError(
+            f"notice.text has {len(text)} bytes, at most {NOTICE_TEXT_MAX} fit: shorten it",
+            field="notice.text",
+        )
+    return block(NOTICE, NOTICE_HEAD.pack(status.notices) + text)
 
 
 def decode_status(data: bytes, key: bytes | None = None) -> Status:
@@ -125,11 +171,15 @@ def decode_status(data: bytes, key: bytes | None = None) -> Status:
     """
     frame = open_frame(STATUS_KIND, data, key)
     values: tuple[Any, ...] | None = None
-    for _, offset, length in blocks(data, frame.end, _KNOWN):
-        if values is not None:
+    notice: tuple[Notices, str] | None = None
+    for block_type, offset, length in blocks(data, frame.end, _KNOWN):
+        if (values if block_type == STATUS else notice) is not None:
             raise BlockDuplicateError(
-                f"block {STATUS} appears again at byte {offset - 4}; each block may appear once"
+                f"block {block_type} appears again at byte {offset - 4}; each block may appear once"
             )
+        if block_type == NOTICE:
+            notice = _read_notice(data, offset, length)
+            continue
         if length != BODY.size:
             raise BlockLengthError(
                 f"the status block at byte {offset} has {length} bytes, expected {BODY.size}; "
@@ -159,8 +209,21 @@ def decode_status(data: bytes, key: bytes | None = None) -> Status:
         rejected,
         scale,
         _STATES[state],
+        *(notice or ()),
     )
 
 
+def _read_notice(data: bytes, offset: int, length: int) -> tuple[Notices, str]:
+    if not NOTICE_HEAD.size <= length <= NOTICE_HEAD.size + NOTICE_TEXT_MAX:
+        raise BlockLengthError(
+            f"the notice block at byte {offset} has {length} bytes, expected {NOTICE_HEAD.size} "
+            f"to {NOTICE_HEAD.size + NOTICE_TEXT_MAX}; correct the server's text",
+            field="notice",
+        )
+    (kinds,) = NOTICE_HEAD.unpack(data, offset)
+    text = data[offset + NOTICE_HEAD.size : offset + length]
+    return Notices(kinds), text.decode("utf-8", "replace")
+
+
 _STATES: Final = tuple(PlatformState)
-_KNOWN: Final = frozenset({STATUS})
+_KNOWN: Final = frozenset({STATUS, NOTICE})

@@ -35,6 +35,7 @@ OFFSETS = {
         "lost 24 reordered 28 rejected 32 scale 36 state 40",
         44,
     ),
+    "notice": ("kinds 0 reserved 2", 4),
 }
 
 PROGRAM = """

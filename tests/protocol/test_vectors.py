@@ -12,6 +12,7 @@ from motion_protocol import (
     Flags,
     Mode,
     Motion,
+    Notices,
     PlatformState,
     Preview,
     ProtocolError,
@@ -59,6 +60,9 @@ MEANT = {
     "cue_newer_minor": Cue(sequence=1, motion=PLAIN, **HEADER),
     "status_run": STATUS,
     "status_signed": replace(STATUS, state=PlatformState.SAFE),
+    "status_notice": replace(
+        STATUS, notices=Notices.TOO_SLOW | Notices.SENDER_TIME, notice_text="2 Hz: too slow \u2713"
+    ),
 }
 REWRITTEN = sorted(MEANT.keys() - {"cue_newer_minor"})
 

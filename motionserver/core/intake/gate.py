@@ -39,19 +39,25 @@ class Gate:
     """
 
     def __init__(
-        self, may_change_owner: Callable[[], bool] = lambda: True, look_ns: int = 0
+        self,
+        may_change_owner: Callable[[], bool] = lambda: True,
+        look_ns: int = 0,
+        is_same_game: Callable[[Owner, Owner], bool] = lambda owner, who: False,
     ) -> None:
         """Take nobody's packets yet.
 
         Args:
             may_change_owner: Whether another client may move the platform now.
             look_ns: Time between two looks at the input [ns].
+            is_same_game: Whether a newcomer is the silent owner itself, on another port: it
+                returns to the drive that it left.
         """
         self._look_ns = look_ns
         self.mode = DriveMode.DRIVE
         self.last_refusal = ""
         self.order = SequenceOrder()
         self._may_change_owner = may_change_owner
+        self._is_same_game = is_same_game
         self._hand_over(None)
 
     def _hand_over(self, who: Owner | None) -> None:
@@ -150,7 +156,7 @@ class Gate:
         if self.owner is None:
             return True
         left = self.mode is DriveMode.BYE or self._is_silent(now_ns)
-        return left and self._may_change_owner()
+        return left and (self._may_change_owner() or self._is_same_game(self.owner, who))
 
     def _is_silent(self, now_ns: int) -> bool:
         age = self.freshness.age_ns(now_ns)
