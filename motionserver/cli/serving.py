@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,13 @@ from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import machine_from_mapping
 from motionserver.errors import MotionServerError
 from motionserver.settings.config import Config, load_config, run_dir_of
-from motionserver.settings.machine import describe_pose
+from motionserver.settings.machine import (
+    MachineAsRead,
+    box_as_toml,
+    box_warning,
+    describe_pose,
+    read_machine,
+)
 from motionserver.settings.resolve import resolve
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
@@ -43,6 +50,8 @@ def serve(path: Path, dry_run: bool) -> int:
     if config.web.enabled:
         scheme = "https" if config.web.tls_cert else "http"
         log.info("page %s://%s:%d", scheme, config.web.host, config.web.port)
+    if warning := box_warning(read_machine(config.platform.preset)):
+        log.warning("%s", warning)
     if dry_run:
         log.info("dry run: everything is played, nothing that moves is sent")
     if config.operator.engage == "auto":
@@ -87,6 +96,7 @@ def describe(path: Path) -> str:
         f"{1 / planner['period']:.1f} Hz, at first {planner['budget'] * 1e3:.1f} ms "
         "before the packet",
     ]
+    lines += box_lines(read_machine(config.platform.preset))
     if planner["side_engines"]:
         lines.append(f"beside     {', '.join(planner['side_engines'])}")
     lines += [f"source     {s['kind']} on {s['host']}:{s['port']}" for s in resolved["sources"]]
@@ -96,6 +106,17 @@ def describe(path: Path) -> str:
     if config.platform.mode == "dof":
         lines.append("note       the base takes a pose: leg limits hold for the declared geometry")
     return "\n".join(lines)
+
+
+def box_lines(read: MachineAsRead) -> list[str]:
+    """What a description says of the box: that it was computed, or is out of proportion."""
+    said = []
+    if read.box_is_computed:
+        toml = box_as_toml(read.machine.box)
+        said.append(f"box        no [table2] in the file; computed: {toml}")
+    if warning := box_warning(read):
+        said.append(f"warning    {warning}")
+    return [line for text in said for line in wrap(text, 80, subsequent_indent=" " * 11)]
 
 
 def ask_guard(op: str, path: Path | None) -> dict[str, Any]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from motionserver.cli.serving import describe
+from motionserver.cli.serving import box_lines, describe
 from motionserver.core.limits import machine_from_mapping
 from motionserver.errors import ConfigError
 from motionserver.evaluate.workspace.command import workspace_text
 from motionserver.settings.config import load_config, run_dir_of
-from motionserver.settings.machine import load_machine
+from motionserver.settings.machine import read_machine
 from motionserver.settings.resolve import resolve
 from motionserver.settings.tuning import apply_changes, default_for
 from motionserver.settings.tuning_presets import PresetShelf
@@ -35,9 +35,10 @@ def check_text(
         )
     if path is None:
         assert platform is not None
-        machine = load_machine(platform)
+        read = read_machine(platform)
+        machine = read.machine
         model, shelf = default_for(machine), None
-        head = [f"{platform}: valid, limits {machine.digest}"]
+        head = [f"{platform}: valid, limits {machine.digest}", *box_lines(read)]
     else:
         config = load_config(path)
         resolved = resolve(config, run_dir_of(config))

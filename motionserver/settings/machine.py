@@ -4,75 +4,38 @@ from __future__ import annotations
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from motionserver.bounded_files import SETTINGS_BYTES, read_bounded_text
-from motionserver.core.axes import AXIS_NAMES, frozen
-from motionserver.core.kinematics.hexapod import neutral_conditioning
-from motionserver.core.limits import Machine, Pace
-from motionserver.core.safety.verify import GUARD_MARGINS, check_ways_home
+from motionserver.core.axes import AXIS_NAMES, Array, frozen
+from motionserver.core.kinematics.reach import single_axis_reach
+from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
-from motionserver.settings.problems import config_error, read_toml
-
-PACE_SHARE = 0.9
-"""Most of a leg limit that raising and parking may use: a move must pass the same check."""
-Metre = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-20.0, le=20.0)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0.0, le=1e4)]
-Point = tuple[Metre, Metre, Metre]
-Joints = tuple[Point, Point, Point, Point, Point, Point]
+from motionserver.settings.machine_file import Complaint, MachineFile
+from motionserver.settings.machine_sense import first_complaint
+from motionserver.settings.machine_slips import likely_slip, names_of
+from motionserver.settings.problems import config_error, place_in_file, read_toml
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+class MachineAsRead(NamedTuple):
+    """A machine, and what its file leaves open.
+
+    Attributes:
+        machine: Geometry and limits.
+        box_is_computed: True if the file has no [table2]; the box is then what each axis reaches.
+        reach: What each axis reaches alone to its nearer side, (6,) [m, rad].
+    """
+
+    machine: Machine
+    box_is_computed: bool
+    reach: Array
 
 
-class _Legs(_Strict):
-    min: Positive
-    max: Positive
-    speed: Positive
-    acceleration: Positive
-    jerk: Positive | None = None
-
-
-class _Parked(_Strict):
-    heave: Metre = 0.0
-
-
-class _Workspace(_Strict):
-    joint_angle_deg: Annotated[float, Field(strict=True, gt=0.0, le=90.0)] | None = None
-    conditioning: Annotated[float, Field(strict=True, gt=0.0, lt=1.0)] | None = None
-    passenger_acceleration: Positive | None = None
-    parked: _Parked
-
-
-class _Box(_Strict):
-    surge: Positive
-    sway: Positive
-    heave: Positive
-    roll_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
-    pitch_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
-    yaw_deg: Annotated[float, Field(strict=True, gt=0.0, lt=80.0)]
-
-
-class _Pace(_Strict):
-    speed: Positive
-    acceleration: Positive
-    jerk: Positive
-
-
-class _MachineFile(_Strict):
-    name: Annotated[str, Field(min_length=1, max_length=60)]
-    neutral_height: Positive
-    base_joints: Joints
-    platform_joints: Joints
-    head: Point = (0.0, 0.0, 0.0)
-    legs: _Legs
-    workspace: _Workspace
-    table2: _Box
-    pace: _Pace
+_SMALLEST, _LARGEST = 0.4, 1.5
+"""Box as a share of what the machine reaches, beyond which it is worth a warning."""
 
 
 def machine_presets() -> list[str]:
@@ -86,6 +49,15 @@ def load_machine(name: str) -> Machine:
 
     Raises:
         ConfigError: It does not exist, a value is wrong, or the machine contradicts itself.
+    """
+    return read_machine(name).machine
+
+
+def read_machine(name: str) -> MachineAsRead:
+    """As `load_machine`, with what there is to say about the file.
+
+    Raises:
+        ConfigError: As `load_machine`.
     """
     path = Path(name)
     if name.endswith(".toml"):
@@ -105,7 +77,7 @@ def load_machine(name: str) -> Machine:
             f"unknown preset {name!r}",
             f"Allowed: {', '.join(machine_presets())}, or the path of a .toml file.",
         )
-    return parse_machine(text, path)
+    return read_machine_text(text, path)
 
 
 def parse_machine(text: str, path: Path) -> Machine:
@@ -114,72 +86,73 @@ def parse_machine(text: str, path: Path) -> Machine:
     Raises:
         ConfigError: As `load_machine`.
     """
+    return read_machine_text(text, path).machine
+
+
+def read_machine_text(text: str, path: Path) -> MachineAsRead:
+    """Read the text of a machine file, and what there is to say about it.
+
+    Raises:
+        ConfigError: As `load_machine`.
+    """
     try:
-        data = _MachineFile.model_validate(read_toml(text, str(path)))
+        data = MachineFile.model_validate(read_toml(text, str(path)))
     except ValidationError as error:
-        raise config_error(error, path, text, _MachineFile) from error
-    angle = data.workspace.joint_angle_deg
-    box = data.table2
-    machine = Machine(
-        name=data.name,
-        base_joints=frozen(data.base_joints),
-        platform_joints=frozen(data.platform_joints),
-        neutral_height=data.neutral_height,
-        leg_min=data.legs.min,
-        leg_max=data.legs.max,
-        leg_speed=data.legs.speed,
-        leg_acceleration=data.legs.acceleration,
-        leg_jerk=data.legs.jerk,
-        joint_angle=None if angle is None else float(np.radians(angle)),
-        conditioning=data.workspace.conditioning,
-        passenger_acceleration=data.workspace.passenger_acceleration,
-        head=frozen(data.head),
-        parked_pose=frozen([0.0, 0.0, data.workspace.parked.heave, 0.0, 0.0, 0.0]),
-        box=frozen(
-            [
-                box.surge,
-                box.sway,
-                box.heave,
-                *np.radians([box.roll_deg, box.pitch_deg, box.yaw_deg]),
-            ]
-        ),
-        pace=Pace(data.pace.speed, data.pace.acceleration, data.pace.jerk),
+        raise config_error(error, path, text, MachineFile) from error
+    complaint = first_complaint(data)
+    if complaint is not None:
+        raise _refused(data, complaint, None, path, text)
+    bare = data.to_machine(np.ones(6))
+    reach = single_axis_reach(bare)
+    complaint = first_complaint(data, reach)
+    if complaint is not None:
+        raise _refused(data, complaint, reach, path, text)
+    box = reach if data.table2 is None else data.table2.to_si()
+    return MachineAsRead(data.to_machine(frozen(box)), data.table2 is None, frozen(reach))
+
+
+def _refused(
+    data: MachineFile, complaint: Complaint, reach: Array | None, path: Path, text: str
+) -> ConfigError:
+    slip = None if complaint.is_plain else likely_slip(data, complaint, reach)
+    place = complaint.place if slip is None else slip.place
+    what = complaint.what
+    if slip is not None and names_of(place) != names_of(complaint.place):
+        what = f"{'.'.join(map(str, complaint.place))}: {what}"
+    do = complaint.do
+    if slip is not None:
+        words = slip.words.capitalize() if slip.words.startswith(("in ", "all ")) else slip.words
+        do = f"{words} {slip.do}{f' Or: {do}' if complaint.is_open else ''}"
+    return ConfigError(place_in_file(path, text, place), what, do)
+
+
+def box_as_toml(box: Array) -> str:
+    """A box (6,) [m, rad] as it stands in a machine file, on one line."""
+    values = [f"{name} = {value:.4g}" for name, value in zip(AXIS_NAMES[:3], box[:3], strict=True)]
+    degrees = zip(AXIS_NAMES[3:], np.degrees(box[3:]), strict=True)
+    values += [f"{name}_deg = {value:.4g}" for name, value in degrees]
+    return f"table2 = {{ {', '.join(values)} }}"
+
+
+def box_warning(read: MachineAsRead) -> str | None:
+    """What is to be said of a box out of proportion to what the machine reaches; None if nothing.
+
+    It is refused nowhere: somebody may want less, and the legs cut down whatever asks for more.
+    """
+    found = []
+    for axis, name in enumerate(AXIS_NAMES):
+        box, reach = float(read.machine.box[axis]), float(read.reach[axis])
+        if _SMALLEST <= box / max(reach, 1e-9) <= _LARGEST:
+            continue
+        shown = (box, reach, "m") if axis < 3 else (np.degrees(box), np.degrees(reach), "deg")
+        times = f"{box / max(reach, 1e-9):.2g} times"
+        found.append(f"{name} {shown[0]:.4g} {shown[2]}, reached {shown[1]:.4g} ({times})")
+    if not found:
+        return None
+    return (
+        f"[table2] of {read.machine.name} is out of proportion to what each axis reaches alone: "
+        f"{'; '.join(found)}. Write {box_as_toml(read.reach)}, or leave [table2] out"
     )
-    _check(machine, path)
-    return machine
-
-
-def _check(machine: Machine, path: Path) -> None:
-    if machine.leg_min >= machine.leg_max:
-        raise ConfigError(
-            f"{path}: legs.min", "not shorter than legs.max", "Give the two ends of the stroke."
-        )
-    if neutral_conditioning(machine) < 1e-3:
-        raise ConfigError(
-            f"{path}: platform_joints",
-            "the hexapod is singular at neutral",
-            "Check the joints' order: leg i joins base joint i and platform joint i.",
-        )
-    for what, start in (("neutral", np.zeros(6)), ("workspace.parked", machine.parked_pose)):
-        homes = np.stack((np.zeros(6), machine.parked_pose))
-        rejection = check_ways_home(machine, start, homes, GUARD_MARGINS)
-        if rejection is not None:
-            raise ConfigError(
-                f"{path}: {what}",
-                f"no allowed straight way between neutral and the parked pose ({rejection})",
-                "Check neutral_height, the joints, legs.min, legs.max and workspace.parked.",
-            )
-    for what, pace, limit in (
-        ("speed", machine.pace.speed, machine.leg_speed),
-        ("acceleration", machine.pace.acceleration, machine.leg_acceleration),
-        ("jerk", machine.pace.jerk, machine.leg_jerk),
-    ):
-        if limit is not None and pace > PACE_SHARE * limit:
-            raise ConfigError(
-                f"{path}: pace.{what}",
-                f"{pace:g} is more than {PACE_SHARE:.0%} of the legs' own limit {limit:g}",
-                f"Raise and park more gently: at most {PACE_SHARE * limit:g}.",
-            )
 
 
 def unchecked_limits(machine: Machine) -> list[str]:

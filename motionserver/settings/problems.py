@@ -63,8 +63,7 @@ def config_error(
     first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
     place = first["loc"]
     keys = [str(part) for part in place]
-    where = f"{path}{_line(text, place)}: " if path is not None else ""
-    where += ".".join(keys) or "the whole file"
+    where = place_in_file(path, text, place)
     more = len(error.errors()) - 1
     tail = f" ({more} more after this one)" if more else ""
     if first["type"] == "extra_forbidden":
@@ -72,6 +71,12 @@ def config_error(
     found = first.get("input")
     shown = "" if isinstance(found, dict | list) else f", found {repr(found)[:_SHOWN]}"
     return ConfigError(where[:_WHERE], f"{first['msg']}{shown}", f"Correct this value.{tail}")
+
+
+def place_in_file(path: Path | None, text: str, place: tuple[int | str, ...]) -> str:
+    """File, line and key of a value, as errors name it."""
+    where = f"{path}{_line(text, place)}: " if path is not None else ""
+    return where + (".".join(map(str, place)) or "the whole file")
 
 
 def _line(text: str, place: tuple[int | str, ...]) -> str:

@@ -251,3 +251,25 @@ def test_a_shelf_without_boxes_warns_of_nothing(tmp_path):
 
 def test_a_planes_file_names_its_machine(found):
     assert "<title>Workspace of t2-compact</title>" in planes_file(found)
+
+
+def test_check_of_a_machine_without_a_box_computes_and_prints_it(tmp_path):
+    before, _, after = PRESET.partition("[table2]")
+    path = tmp_path / "mine.toml"
+    path.write_text(before + "[pace]" + after.partition("[pace]")[2], "utf-8")
+    ended = run("--platform", str(path))
+    assert ended.exit_code == 0
+    said = " ".join(ended.stdout.split())
+    assert "no [table2] in the file; computed: table2 = { surge = 0.1979, sway = 0.2201" in said
+    assert "warning [table2]" not in said
+    config = tmp_path / "c.toml"
+    config.write_text(f'[platform]\npreset = "{path}"\n[server]\nstate_dir = "{tmp_path}/s"\n')
+    assert "no [table2] in the file; computed" in " ".join(run(str(config)).stdout.split())
+
+
+def test_check_of_a_box_out_of_proportion_warns(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(PRESET.replace("surge = 0.198", "surge = 0.99"), "utf-8")
+    ended = run("--platform", str(path))
+    assert ended.exit_code == 0
+    assert "surge 0.99 m, reached 0.1979 (5 times)" in " ".join(ended.stdout.split())
