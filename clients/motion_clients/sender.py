@@ -33,6 +33,8 @@ from .outage import Outage
 
 _DRAIN_MAX: Final = 64
 _ROUND_TRIPS: Final = 16
+_LATE: Final = 16
+"""Statuses by which one may be overtaken; there are about ten a second."""
 _AT_REST: Final = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -271,5 +273,7 @@ class CueSender:
         ahead = status.receive_time_ns - status.echo_sender_time_ns
         offset = (ahead + ahead - away + held) // 2
         self._round_trips = [*self._round_trips, ((away - held) * 1e-9, offset)][-_ROUND_TRIPS:]
-        if self._status is None or sequence_delta(status.sequence, self._status.sequence) > 0:
+        former = self._status
+        # a little behind came late; far behind counts a server that was started again
+        if former is None or not -_LATE < sequence_delta(status.sequence, former.sequence) <= 0:
             self._status = status

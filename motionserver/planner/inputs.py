@@ -12,6 +12,7 @@ from motionserver.core.intake.gate import REORDER_NS, Gate, Owner
 from motionserver.core.state import DriveMode, VehicleMotion
 from motionserver.planner.preview import PreviewInlet
 from motionserver.planner.session_file import SessionKeeper
+from motionserver.planner.sessions import JUMPED
 from motionserver.planner.source_input import (
     MOST_SENDERS,
     Datagrams,
@@ -203,6 +204,8 @@ class Inputs:
         mark = self._sessions.hear(motion.session, motion.sequence)
         if motion.sequence > mark:
             return None
+        if mark == JUMPED:
+            return "jumped"
         if gate.owner != Owner(source.name, address, motion.session):
             return "session-over"
         # by the names of the order that every owner has to keep

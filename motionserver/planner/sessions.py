@@ -8,6 +8,14 @@ from typing import Final
 
 MOST: Final = 4096
 """Sessions that are remembered; the one not heard for longest is forgotten first."""
+FAR: Final = 1 << 24
+"""A sequence so far beyond the mark is a slip of its sender unless others go on from it."""
+FEW: Final = 3
+"""Packets in a row that must go on from it."""
+NEAR: Final = 16
+"""How far apart these may be."""
+JUMPED: Final = 1 << 32
+"""What `Sessions.hear` returns for such a packet: beyond every sequence."""
 OVER: Final = 0xFFFFFFFF
 """Mark of a session of which nothing is believed any more."""
 
@@ -19,6 +27,9 @@ class Sessions:
     those of one session count upwards; so whatever is at or below the mark was on the wire before.
     Packets that were refused for another reason raise the mark too: they could be recorded as well.
 
+    One number that is far ahead would end its session; it does not raise the mark, and is not used.
+    Who recorded it cannot use it either: only several in a row are, and those raise the mark.
+
     Args:
         marks: Sessions and their marks, the one heard last at the end.
     """
@@ -26,6 +37,7 @@ class Sessions:
     def __init__(self, marks: Iterable[tuple[int, int]] = ()) -> None:
         self._marks = dict(marks)
         self._here: set[int] = set()
+        self._far: dict[int, tuple[int, int]] = {}
         self._shrink()
 
     def __len__(self) -> int:
@@ -43,13 +55,21 @@ class Sessions:
             sequence: Of the same packet. A session ends before its sequence wraps.
 
         Returns:
-            The mark before it, -1 without any. A packet at or below may be a recording.
+            The mark before it, -1 without any. A packet at or below may be a recording. `JUMPED`
+            for a sequence far ahead that nothing confirms yet.
         """
         mark = self._marks.pop(session, -1)
-        self._marks[session] = max(mark, sequence)
+        jumped = mark >= 0 and sequence - mark > FAR and not self._goes_on(session, sequence)
+        self._marks[session] = mark if jumped else max(mark, sequence)
         self._here.add(session)
         self._shrink()
-        return mark
+        return JUMPED if jumped else mark
+
+    def _goes_on(self, session: int, sequence: int) -> bool:
+        at, count = self._far.get(session, (-1, 0))
+        count = count + 1 if 0 < sequence - at <= NEAR else 1
+        self._far[session] = (sequence, count)
+        return count >= FEW
 
     def newest(self, count: int) -> list[tuple[int, int]]:
         """The ``count`` sessions heard last with their marks, the last one at the end."""
@@ -71,3 +91,4 @@ class Sessions:
             oldest = next(iter(self._marks))
             del self._marks[oldest]
             self._here.discard(oldest)
+            self._far.pop(oldest, None)

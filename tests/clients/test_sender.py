@@ -177,6 +177,17 @@ def test_sender_reads_status_and_measures_the_round_trip(server):
         assert cue.status() == status_for(cue)
 
 
+def test_sender_hears_a_server_that_was_started_again(server):
+    with CueSender(address_of(server)) as cue:
+        cue.send((0.0, 0.0, 0.0))
+        _, client = server.recvfrom(2000)
+        for count, sequence in enumerate([5000, 4990, 0, 1], start=1):
+            server.sendto(encode_status(status_for(cue, sequence=sequence)), client)
+            wait_for(cue, count)
+            seen = cue.status().sequence
+            assert seen == (5000 if sequence == 4990 else sequence)
+
+
 def test_sender_keeps_the_newest_status_and_counts_foreign_ones(server):
     with CueSender(address_of(server)) as cue:
         cue.send((0.0, 0.0, 0.0))

@@ -91,8 +91,20 @@ def test_a_game_and_then_zenoh_move_the_platform_and_the_sensor_is_heard(tmp_pat
         assert all(abs(x) < 1.0 for x in disturbance), disturbance
         assert rig.counter("accepted_sensor") > 50
 
+        # the game pauses: it sends nothing, far longer than a lost client is waited for
         stop.set()
         game.join(10.0)
+        rig.wait_state("HOLD")
+        rig.wait_for(lambda: rig.shown("planner")["source"]["age_s"] > 5.0, "a pause of 5 s")
+        assert rig.state == "HOLD"
+        assert rig.shown("planner")["source"]["mode"] == "pause"
+        stop.clear()
+        game = threading.Thread(target=send_motionsim, args=(beam, stop), daemon=True)
+        game.start()
+        rig.wait_state("RUN")
+        stop.set()
+        game.join(10.0)
+        assert rig.ask("park")["ok"]
         rig.wait_state("PARKED")
 
         with subprocess.Popen(

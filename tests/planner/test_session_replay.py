@@ -152,6 +152,34 @@ def test_the_owner_keeps_the_names_of_its_order(server: Server) -> None:
     assert server.refused() == 0
 
 
+@pytest.mark.parametrize("slips", [1, 2])
+def test_one_number_far_ahead_does_not_end_a_signed_session(server: Server, slips: int) -> None:
+    """Nor can who recorded it play it, before or after its session ended."""
+    server.hear(*drive(7, 50))
+    far = drive(7, slips, 1 << 30)
+    assert server.hear(*far) == 0
+    assert server.inputs.counters["refused_jumped"] == slips
+    assert server.hear(*drive(7, 50, 50)) == 50
+    for _ in range(3):
+        assert server.hear(*far, *far, sender="rogue:9") == 0
+    server.now += 60 * SECOND
+    for _ in range(3):
+        assert server.hear(*far, *far, sender="rogue:9") == 0
+    server.kill(service=True)
+    server.start()
+    assert server.hear(*far, *far, sender="rogue:9") == 0
+
+
+def test_a_signed_count_that_goes_on_far_ahead_is_followed_and_cannot_be_played(
+    server: Server,
+) -> None:
+    server.hear(*drive(7, 50))
+    tape = drive(7, 40, 1 << 30)
+    assert server.hear(*tape) >= 35
+    server.now += 5 * SECOND
+    assert server.hear(*tape, *drive(7, 50), sender="rogue:9") == 0
+
+
 def test_a_client_that_was_silent_goes_on_even_from_another_address(server: Server) -> None:
     server.hear(*drive(7, 5))
     server.now += 5 * SECOND
