@@ -63,7 +63,10 @@ class F1(Silence):
     number = 1
     title = "client silent"
     detection = "age of the newest packet > max(50 ms, 3 T)"
-    reaction = "HOLD, fade 0.3 s; PARKING after 2 s"
+    reaction = (
+        "HOLD, fade 0.3 s; PARKING after 2 s, of a format that pauses by silence (BeamNG) after "
+        "10 min"
+    )
     recovery = "fresh for 0.5 s: RUN; parked: a new engage"
 
     def __init__(self, world, rng):
@@ -87,7 +90,9 @@ class F1(Silence):
 class F6(ClientFault):
     number = 6
     title = "a burst of old packets after a stall"
-    detection = "sender's time against the least delay seen"
+    detection = (
+        "spacing of arrivals against that of the sender's times; its clock may drift or be set"
+    )
     reaction = "HOLD in the stall; the old ones are dropped and counted"
     recovery = "automatic"
     counter = "refused_old"

@@ -239,9 +239,12 @@ class F9(ClientFault):
 
 class F35(ClientFault):
     number = 35
-    title = "wrong units: degrees for radians, g for m/s2"
-    detection = "median of force and rate over 10 s"
-    reaction = "told; engaging is refused"
+    title = "wrong units, signs or gravity: degrees for radians, g for m/s2"
+    detection = (
+        "standstill feels 9.81 m/s2, medians of 10 s, attitude within pi and pi/2, rates against "
+        "attitude, speed against acceleration"
+    )
+    reaction = "told to operator and client; engaging is refused"
     recovery = "a client with other units"
     from_start = True
 
