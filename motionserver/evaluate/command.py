@@ -112,7 +112,13 @@ def evaluate(
         machine, recording, base, rate=rate, planner_hz=planner_hz, jobs=jobs, tell=tell
     )
     hindsight = find_hindsight(
-        machine, recording, base, rate=rate, planner_hz=planner_hz, tell=tell
+        machine,
+        recording,
+        base,
+        rate=rate,
+        planner_hz=planner_hz,
+        yardstick=yardstick,
+        tell=tell,
     )
     still = no_motion(machine, recording, base.scale, rate)
     drives += [yardstick.drive, hindsight.drive, still]

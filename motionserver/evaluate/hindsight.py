@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.limits import Machine
-from motionserver.cueing.classical import Classical
+from motionserver.cueing.classical import REID_NAHON, Classical
 from motionserver.cueing.think import Thinker
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.drive import RATE_HZ, Drive
@@ -18,6 +18,7 @@ from motionserver.evaluate.metrics.figures import rmse_xy
 from motionserver.evaluate.metrics.workspace import workspace_figures
 from motionserver.evaluate.recording import Recording
 from motionserver.evaluate.screen import Screen, Washout
+from motionserver.evaluate.yardstick import Yardstick, find_yardstick
 
 HIGHS: Final = (1.5, 4.0, 9.0)
 """High-pass corners of surge and sway [rad/s].
@@ -36,8 +37,8 @@ HINDSIGHT_RULE: Final = (
     f"high-pass {', '.join(f'{h:g}' for h in HIGHS)} x tilt low-pass "
     f"{', '.join(f'{low:g}' for low in LOWS)} rad/s x gain {', '.join(f'{g:g}' for g in GAINS)}, "
     "screened as filters alone (no planner, no latency, tilt rate limited in the loop, sets that "
-    "leave a leg's limits left out), the three best also driven through the server with its "
-    "governor; the better of all counts"
+    "leave a leg's limits left out), the three best and the yardstick also driven through the "
+    "server with its governor; the better of all counts"
 )
 """How it is chosen, for people."""
 
@@ -68,7 +69,7 @@ class Hindsight:
         by_server: True if the server's drive counts, False if the screen's.
         drive: What it does.
         screened: All sets, the best inside first.
-        driven: The screen's best through the server, in the same order.
+        driven: The screen's best through the server, in the same order, then the yardstick.
         best_screen: RMSE of the screen's best that breaks no limit; None if all do [m/s2].
     """
 
@@ -101,9 +102,13 @@ def find_hindsight(
     *,
     rate: float = RATE_HZ,
     planner_hz: float = PLANNER_HZ,
+    yardstick: Yardstick | None = None,
     tell: Told | None = None,
 ) -> Hindsight:
-    """Search corners and gain.
+    """Search corners and gain; whatever the yardstick may choose from is among the choices.
+
+    The yardstick's grid of gains is finer than that of the screen, and the governor makes something
+    of sets that the screen leaves out, so its best can be the best of all.
 
     Args:
         machine: Geometry, hard limits and head point.
@@ -111,11 +116,14 @@ def find_hindsight(
         tuning: Scale and thresholds; algorithm, gain and filters are replaced.
         rate: Rate of the executed samples [Hz].
         planner_hz: Planner rate of the server's drives [Hz].
+        yardstick: That of this recording, tuning and rates; searched if None.
         tell: Called with a line of progress.
 
     Returns:
         The best of all.
     """
+    if yardstick is None:
+        yardstick = find_yardstick(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
     screen = Screen(machine, recording, tuning, HIGHS, LOWS, GAINS)
     trials = [
         Trial(washout, *screen.judge(washout))
@@ -125,13 +133,15 @@ def find_hindsight(
     trials.sort(key=lambda t: (not t.inside, t.rmse if t.inside else t.washout.gain, t.rmse))
     shown = _first_inside(screen, trials, rate)
     best = None if shown is None else rmse_xy(shown[1])
+    washouts = [trial.washout for trial in trials[:DRIVEN]]
     drives = [
-        _through_server(machine, recording, tuning, trial.washout, rate, planner_hz)
-        for trial in trials[:DRIVEN]
+        _through_server(machine, recording, tuning, washout, rate, planner_hz)
+        for washout in washouts
     ]
+    washouts.append(_standard(yardstick.gain))
+    drives.append(yardstick.drive)
     driven = tuple(
-        Trial(trial.washout, rmse_xy(made), True)
-        for trial, made in zip(trials, drives, strict=False)
+        Trial(washout, rmse_xy(made), True) for washout, made in zip(washouts, drives, strict=True)
     )
     winner = int(np.argmin([trial.rmse for trial in driven]))
     if shown is None or driven[winner].rmse <= rmse_xy(shown[1]):
@@ -144,6 +154,11 @@ def find_hindsight(
     if tell is not None:
         tell(f"hindsight: {found.described()}")
     return found
+
+
+def _standard(gain: float) -> Washout:
+    """The yardstick's corners with this gain."""
+    return Washout(REID_NAHON.high.omega, REID_NAHON.low.omega, gain)
 
 
 def _first_inside(screen: Screen, trials: list[Trial], rate: float) -> tuple[Washout, Drive] | None:

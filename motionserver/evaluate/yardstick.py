@@ -86,6 +86,20 @@ def find_yardstick(
     return Yardstick(best_gain, replace(best, name="yardstick"), tuple(sorted(tried.items())))
 
 
+def yardstick_of(
+    machine: Machine,
+    recording: Recording,
+    tuning: Tuning,
+    gain: float,
+    *,
+    rate: float = RATE_HZ,
+    planner_hz: float = PLANNER_HZ,
+) -> Yardstick:
+    """The yardstick whose gain was found before, driven again; see `find_yardstick`."""
+    driven = _drive(machine, recording, tuning, rate, planner_hz, gain)
+    return Yardstick(gain, replace(driven, name="yardstick"), ((gain, rmse_xy(driven)),))
+
+
 def _all(run: Callable[[float], Drive], gains: tuple[float, ...], jobs: int) -> list[Drive]:
     if jobs <= 1 or len(gains) < 2:
         return [run(gain) for gain in gains]

@@ -11,6 +11,7 @@ from motionserver.evaluate.hindsight import DRIVEN, GAINS, HIGHS, LOWS, find_hin
 from motionserver.evaluate.metrics.figures import rmse_xy
 from motionserver.evaluate.recording import from_samples, read_recording
 from motionserver.evaluate.screen import STEP, Screen, Washout
+from motionserver.evaluate.yardstick import find_yardstick
 from motionserver.settings.machine import load_machine
 
 MACHINE = load_machine("t2-compact")
@@ -31,8 +32,10 @@ def found():
 
 def test_all_sets_are_screened_and_the_better_way_counts(found):
     assert len(found.screened) == len(HIGHS) * len(LOWS) * len(GAINS) == 63
-    assert len(found.driven) == DRIVEN
-    assert [t.washout for t in found.driven] == [t.washout for t in found.screened[:DRIVEN]]
+    assert len(found.driven) == DRIVEN + 1
+    assert [t.washout for t in found.driven[:DRIVEN]] == [
+        t.washout for t in found.screened[:DRIVEN]
+    ]
     inside = [trial.rmse for trial in found.screened if trial.inside]
     assert inside == sorted(inside)
     counts = rmse_xy(found.drive)
@@ -42,9 +45,38 @@ def test_all_sets_are_screened_and_the_better_way_counts(found):
     assert "counts" in found.described()
 
 
+def bumpy(seed, up, seconds=6.0):
+    """Smooth noise on all axes, heave and turns beyond what the screen finds inside."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(seconds * 100.0) + 1) / 100.0
+    grid = np.arange(0.0, seconds + 0.4, 0.25)
+    draw = rng.normal(size=(6, len(grid)))
+    sizes = np.array([1.5, 1.5, up, 0.2, 0.2, 0.2])
+    columns = [np.interp(times, grid, s * d) for s, d in zip(sizes, draw, strict=True)]
+    force = np.column_stack(columns)
+    table = force[:, :3] + np.array([0.0, 0.0, GRAVITY])
+    return from_samples("bumpy", times, table, force[:, 3:], np.full(len(times), 15.0))
+
+
+def test_hindsight_is_never_worse_than_the_yardstick():
+    recording = bumpy(2, 15.0)
+    yardstick = find_yardstick(MACHINE, recording, TUNING, rate=250.0, planner_hz=50.0)
+    given = find_hindsight(
+        MACHINE, recording, TUNING, rate=250.0, planner_hz=50.0, yardstick=yardstick
+    )
+    assert rmse_xy(given.drive) <= rmse_xy(yardstick.drive)
+    assert given.drive.name == "hindsight"
+
+
+def test_without_a_yardstick_it_is_searched(found):
+    yardstick = find_yardstick(MACHINE, CURVE, TUNING, rate=250.0)
+    assert found.driven[-1].rmse == rmse_xy(yardstick.drive)
+    assert found.driven[-1].washout.gain == yardstick.gain
+
+
 def test_screen_and_server_tell_the_same_story(found):
     screened = {trial.washout: trial.rmse for trial in found.screened}
-    for trial in found.driven:
+    for trial in found.driven[:DRIVEN]:
         assert trial.rmse == pytest.approx(screened[trial.washout], rel=0.1)
 
 

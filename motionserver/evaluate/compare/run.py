@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from concurrent.futures import as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
@@ -21,7 +21,7 @@ from motionserver.evaluate.lockstep import drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.worker_pool import worker_pool
-from motionserver.evaluate.yardstick import find_yardstick
+from motionserver.evaluate.yardstick import find_yardstick, yardstick_of
 
 CURVE_HZ: Final = 20.0
 """Rate of the curves that are kept for the page [Hz]."""
@@ -62,25 +62,66 @@ def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Re
         shown = "-" if nrmse is None else f"{nrmse:.3f}"
         tell(f"{done}/{len(missing)} {name}: nRMSE {shown} in {result['seconds']:.0f} s")
 
+    # the searches take longest: first, so that no core waits for them in the end
+    order = sorted(missing, key=lambda index: tasks[index].contender.way != "")
+    gains = _Gains(tasks, results)
     if jobs <= 1 or len(missing) < 2:
-        for index in missing:
-            take(index, *_guarded(tasks[index], files[index]))
+        while order:
+            index = gains.next_of(order)
+            take(index, *_guarded(tasks[index], files[index], gains.of(index)))
         return results
-    with worker_pool(min(jobs, len(missing))) as pool:
-        # the searches take longest: first, so that no core waits for them in the end
-        order = sorted(missing, key=lambda index: tasks[index].contender.way != "")
-        futures = {pool.submit(_guarded, tasks[index], files[index]): index for index in order}
-        for future in as_completed(futures):
-            take(futures[future], *future.result())
+    count = min(jobs, len(missing))
+    with worker_pool(count) as pool:
+        running: dict[Future[tuple[Result | None, str]], int] = {}
+        while order or running:
+            while order and len(running) < count:
+                index = gains.next_of(order)
+                future = pool.submit(_guarded, tasks[index], files[index], gains.of(index))
+                running[future] = index
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                take(running.pop(future), *future.result())
     return results
 
 
-def drive_task(task: Task) -> Result:
+class _Gains:
+    """The yardstick's gains as they become known: hindsight drives it again, not its search."""
+
+    def __init__(self, tasks: list[Task], results: list[Result | None]) -> None:
+        self._tasks, self._results = tasks, results
+        self._yardsticks = {
+            task.recording: index
+            for index, task in enumerate(tasks)
+            if task.contender.name == "yardstick"
+        }
+
+    def of(self, index: int) -> float | None:
+        """The gain for a hindsight task; None for others, and while it is not known."""
+        task = self._tasks[index]
+        yardstick = self._yardsticks.get(task.recording)
+        if task.contender.name != "hindsight" or yardstick is None:
+            return None
+        result = self._results[yardstick]
+        return None if result is None else float(result["gain"])
+
+    def next_of(self, waiting: list[int]) -> int:
+        """Take out the first that lacks no gain, the first of all if each lacks one."""
+        for place, index in enumerate(waiting):
+            if self._tasks[index].contender.name != "hindsight" or self.of(index) is not None:
+                return waiting.pop(place)
+        return waiting.pop(0)
+
+
+def drive_task(task: Task, gain: float | None = None) -> Result:
     """Drive and judge one task.
 
+    Args:
+        task: Who drives what.
+        gain: For hindsight the yardstick's on the same recording; searched if None.
+
     Returns:
-        ``figures`` (as of `figures_of`), ``note`` (how a rival was found), ``seconds`` it took,
-        ``curves``: t [s], wanted and felt f_x, f_y [m/s2] at `CURVE_HZ`.
+        ``figures`` (as of `figures_of`), ``note`` (how a rival was found), ``gain`` of the
+        yardstick (else None), ``seconds`` it took, ``curves``: t [s], wanted and felt f_x, f_y
+        [m/s2] at `CURVE_HZ`.
     """
     begun = perf_counter()
     recording, machine, contender = read_recording(task.recording), task.machine, task.contender
@@ -90,9 +131,14 @@ def drive_task(task: Task) -> Result:
         driven = no_motion(machine, recording, tuning.scale, rate)
     elif contender.name == "yardstick":
         found = find_yardstick(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
-        driven, note = found.drive, f"gain {found.gain:g}"
+        driven, note, gain = found.drive, f"gain {found.gain:g}", found.gain
     elif contender.name == "hindsight":
-        best = find_hindsight(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+        known = None
+        if gain is not None:
+            known = yardstick_of(machine, recording, tuning, gain, rate=rate, planner_hz=planner_hz)
+        best = find_hindsight(
+            machine, recording, tuning, rate=rate, planner_hz=planner_hz, yardstick=known
+        )
         driven, note = best.drive, best.described()
     else:
         driven = drive(
@@ -109,15 +155,16 @@ def drive_task(task: Task) -> Result:
         "duration": recording.duration,
         "contender": contender.label,
         "note": note,
+        "gain": gain if contender.name == "yardstick" else None,
         "figures": asdict(figures_of(driven)),
         "curves": _curves(driven),
         "seconds": perf_counter() - begun,
     }
 
 
-def _guarded(task: Task, file: Path) -> tuple[Result | None, str]:
+def _guarded(task: Task, file: Path, gain: float | None) -> tuple[Result | None, str]:
     try:
-        result = drive_task(task)
+        result = drive_task(task, gain)
     except Exception as error:
         # one drive that fails must not take hours of others with it
         return None, f"{type(error).__name__}: {error}"
