@@ -1,85 +1,54 @@
-"""Recorded drives: CSV files of what a vehicle did, read with exact complaints."""
+"""Recorded drives: CSV files of what a vehicle did, read with exact complaints.
+
+Needed are ``t``, either ``ax, ay, az`` (kinematic acceleration, 0 at rest) or ``fx, fy, fz``
+(specific force, +9.81 in z at rest), ``p, q, r`` and ``v``; ``roll, pitch`` are zero where they are
+missing. What `motionserver record` writes holds them beside what the platform did, and `EXTRAS`;
+there a row without ``t`` is one of the platform alone.
+"""
 
 from __future__ import annotations
 
-import csv
-from bisect import bisect_right
-from dataclasses import dataclass
-from math import isfinite
+from collections.abc import Sequence
+from math import cos, sin
 from pathlib import Path
 from typing import Final
 
+from motion_protocol import Vector3
+
+from .csv_table import Table, check_lengths, number, read_table
+from .csv_text import RecordingError
+from .drive_samples import PreviewSample, RecordedSample, Recording
+from .recording_checks import (
+    acceleration_warnings,
+    angle_warnings,
+    time_warnings,
+    unit_warnings,
+)
+from .recording_extras import EXTRAS, OWN, Extras, changes
+
+__all__ = [
+    "COLUMNS",
+    "EXTRAS",
+    "PreviewSample",
+    "RecordedSample",
+    "Recording",
+    "RecordingError",
+    "read_recording",
+    "recording_names",
+    "recording_path",
+]
+
 COLUMNS: Final = ("t", "ax", "ay", "az", "p", "q", "r", "v", "roll", "pitch")
-"""Columns a recording must have, in any order; further ones are ignored."""
+"""Columns of a recording, in any order; further ones but `FORCE` and `EXTRAS` are ignored."""
+FORCE: Final = ("fx", "fy", "fz")
+"""May stand in place of ax, ay, az: specific force."""
+GRAVITY: Final = 9.81
+"""As the server counts it [m/s^2]."""
+EPOCH: Final = 1e8
+"""Later times count from 1970 or the like [s]."""
 
 _RECORDINGS: Final = Path(__file__).parent / "recordings"
-
-
-class RecordingError(Exception):
-    """A recording cannot be found or read.
-
-    Attributes:
-        path: The file.
-        line: Line in the file, from 1; None if it is the file as a whole.
-        column: Name of the column; None if it is the line as a whole.
-    """
-
-    def __init__(
-        self, path: Path, complaint: str, *, line: int | None = None, column: str | None = None
-    ) -> None:
-        where = f"{path}"
-        where += "" if line is None else f", line {line}"
-        where += "" if column is None else f", column {column}"
-        super().__init__(f"{where}: {complaint}")
-        self.path = path
-        self.line = line
-        self.column = column
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedSample:
-    """One instant of a recording, ISO 8855 body axes.
-
-    Attributes:
-        time: Since whatever the recording counts from [s].
-        acceleration: Kinematic acceleration x, y, z, gravity removed [m/s^2].
-        rates: Body rates p, q, r [rad/s].
-        speed: Forward speed [m/s].
-        attitude: Roll (positive left side up), pitch (positive nose down) [rad].
-    """
-
-    time: float
-    acceleration: tuple[float, float, float]
-    rates: tuple[float, float, float]
-    speed: float
-    attitude: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A whole drive.
-
-    Attributes:
-        path: The file it came from.
-        samples: At least two, their times strictly increasing.
-    """
-
-    path: Path
-    samples: tuple[RecordedSample, ...]
-
-    @property
-    def duration(self) -> float:
-        """From the first to the last sample [s]."""
-        return self.samples[-1].time - self.samples[0].time
-
-    @property
-    def period(self) -> float:
-        """Mean spacing of the samples [s]."""
-        return self.duration / (len(self.samples) - 1)
-
-    def index_at(self, time: float) -> int:
-        """Index of the last sample not later than `time` [s], of the first if none is."""
-        return max(0, bisect_right(self.samples, time, key=_time_of) - 1)
+_COARSE: Final = 0.1  # of a step: a written time that is coarser says too little
 
 
 def recording_names() -> tuple[str, ...]:
@@ -102,74 +71,156 @@ def recording_path(name: str) -> Path:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Read a CSV file with the columns `COLUMNS`.
+    """Read a CSV file of any usual dialect, see `csv_table`.
 
     Raises:
-        RecordingError: The file cannot be read; file, line and column are named.
+        RecordingError: The file cannot be read, or says what no drive can be; file, line and
+            column are named.
     """
-    file = Path(path)
-    samples: list[RecordedSample] = []
-    try:
-        with file.open(encoding="utf-8-sig", newline="") as stream:
-            reader = csv.reader(stream)
-            header = [name.strip() for name in next(reader, [])]
-            order = _column_order(file, header)
-            for row in reader:
-                if row:
-                    samples.append(_read_row(file, reader.line_num, header, order, row))
-                    _check_time(file, reader.line_num, samples)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(file, f"cannot be read as CSV text ({error})") from error
-    if len(samples) < 2:
-        raise RecordingError(file, f"has {len(samples)} samples; a recording needs at least two")
-    return Recording(file, tuple(samples))
+    table = read_table(Path(path), (*COLUMNS, *FORCE))
+    is_own = table.has(*OWN)
+    all_rows = table.rows
+    if is_own and table.is_cut and all_rows and len(all_rows[-1][1]) != len(table.names):
+        # cut off by a full disk or a power cut
+        all_rows = all_rows[:-1]
+    columns, warnings = _columns(table)
+    check_lengths(table, all_rows)
+    rows = all_rows
+    if is_own:
+        place = table.index("t")
+        rows = tuple(row for row in all_rows if row[1][place].strip())
+    values = table.numbers(columns, rows)
+    missing = [name for name in COLUMNS[8:] if name not in columns]
+    if missing:
+        values = [_levelled(row, columns) for row in values]
+    if len(rows) < 2:
+        raise RecordingError(table.path, f"has {len(rows)} samples; a recording needs at least two")
+    lines = [line for line, _ in rows]
+    _check_times(table, rows, [row[0] for row in values])
+    warnings += _warnings(table, values, columns, lines)
+    extras = Extras(table)
+    samples = tuple(
+        _sample(value, columns[1] == "fx", extras, line, row)
+        for value, (line, row) in zip(values, rows, strict=True)
+    )
+    states = changes(table, all_rows, "state") if is_own else ()
+    settings = changes(table, all_rows, "settings") if is_own else ()
+    return Recording(table.path, samples, tuple(warnings), states, settings)
 
 
-def _column_order(path: Path, header: list[str]) -> list[int]:
-    for column in COLUMNS:
-        if header.count(column) != 1:
+def _columns(table: Table) -> tuple[tuple[str, ...], list[str]]:
+    """Columns to read, and what is to be said of them.
+
+    Raises:
+        RecordingError: One is missing, or there more than once.
+    """
+    warnings = []
+    three = COLUMNS[1:4]
+    if any(name in table.names for name in FORCE):
+        if table.has(*three):
+            warnings.append("columns fx, fy, fz: left out, ax, ay, az are there as well")
+        else:
+            three = FORCE
+    attitude = [name for name in COLUMNS[8:] if name in table.names]
+    missing = [name for name in COLUMNS[8:] if name not in table.names]
+    if missing:
+        warnings.append(
+            f"column {' and '.join(missing)} missing: taken as 0, a level road; add "
+            f"{'it' if len(missing) == 1 else 'them'} in rad, or in degrees as "
+            f"{' and '.join(f'{name} [deg]' for name in missing)}"
+        )
+    columns = ("t", *three, *COLUMNS[4:8], *attitude)
+    for column in columns:
+        table.index(column)
+    return columns, warnings
+
+
+def _levelled(row: list[float], columns: Sequence[str]) -> list[float]:
+    """The row with roll and pitch 0 where they are missing."""
+    told = dict(zip(columns[8:], row[8:], strict=True))
+    return [*row[:8], *(told.get(name, 0.0) for name in COLUMNS[8:])]
+
+
+def _warnings(
+    table: Table, values: list[list[float]], names: tuple[str, ...], lines: list[int]
+) -> list[str]:
+    t, *rest = (list(column) for column in zip(*values, strict=True))
+    three, rates, speeds, attitude = rest[0:3], rest[3:6], rest[6], rest[7:9]
+    is_force = names[1] == "fx"
+    has_unit = bool(table.unit(names[1]))
+    out = time_warnings(t, lines, bool(table.unit("t")))
+    found = acceleration_warnings(three, speeds, names[1:4], is_force)
+    if not found and not (out and "t [ms]" in out[0]):
+        kinematic = three
+        if is_force:
+            pairs = zip(values, strict=True)
+            kinematic = [list(c) for c in zip(*(_kinematic(v) for (v,) in pairs), strict=True)]
+        found = unit_warnings(t, kinematic[0], kinematic[1:], speeds, has_unit)
+    turning = bool(table.unit("p"))
+    leaning = any(table.unit(name) for name in COLUMNS[8:] if name in table.names)
+    return [*out, *found, *angle_warnings(rates, attitude, (turning, leaning))]
+
+
+def _check_times(
+    table: Table, rows: Sequence[tuple[int, list[str]]], times: Sequence[float]
+) -> None:
+    for k in range(1, len(times)):
+        if times[k] <= times[k - 1]:
             raise RecordingError(
-                path,
-                f"the header has this column {header.count(column)} times, needed is once; "
-                f"the first line names the columns {','.join(COLUMNS)}",
-                line=1,
-                column=column,
+                table.path,
+                f"{times[k]:.12g} s does not come after {times[k - 1]:.12g} s of the row before; "
+                "times must increase: sort the rows, or write more digits",
+                line=rows[k][0],
+                column="t",
             )
-    return [header.index(column) for column in COLUMNS]
-
-
-def _read_row(
-    path: Path, line: int, header: list[str], order: list[int], row: list[str]
-) -> RecordedSample:
-    if len(row) != len(header):
+    if times[0] < EPOCH:
+        return
+    place = table.index("t")
+    digits = max(_decimals(row[place]) for _, row in rows)
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    unit = (times[0] / (number(rows[0][1][place], "," in rows[0][1][place]) or 1.0)) or 1.0
+    if 10.0**-digits * unit > _COARSE * step * (1.0 + 1e-6):
         raise RecordingError(
-            path, f"{len(row)} fields, the header names {len(header)}", line=line
-        )  # fmt: skip
-    values: list[float] = []
-    for column, index in zip(COLUMNS, order, strict=True):
-        try:
-            value = float(row[index])
-        except ValueError:
-            value = float("nan")
-        if not isfinite(value):
-            raise RecordingError(
-                path, f"{row[index]!r} is not a finite number", line=line, column=column
-            )
-        values.append(value)
-    t, ax, ay, az, p, q, r, v, roll, pitch = values
-    return RecordedSample(t, (ax, ay, az), (p, q, r), v, (roll, pitch))
-
-
-def _check_time(path: Path, line: int, samples: list[RecordedSample]) -> None:
-    if len(samples) > 1 and samples[-1].time <= samples[-2].time:
-        raise RecordingError(
-            path,
-            f"{samples[-1].time} s does not come after {samples[-2].time} s of the row before; "
-            f"times must increase",
-            line=line,
+            table.path,
+            f"{rows[0][1][place].strip()} counts from 1970 with {digits} decimals, too few digits "
+            f"for steps of {step:.3g} s; write t from the beginning of the drive, or with all six "
+            "decimals",
+            line=rows[0][0],
             column="t",
         )
 
 
-def _time_of(sample: RecordedSample) -> float:
-    return sample.time
+def _decimals(text: str) -> int:
+    mantissa, _, exponent = text.strip().lower().replace(",", ".").partition("e")
+    fraction = mantissa.partition(".")[2]
+    return len(fraction) - (int(exponent) if exponent else 0)
+
+
+def _kinematic(row: Sequence[float]) -> Vector3:
+    roll, pitch = row[8], row[9]
+    return (
+        row[1] + GRAVITY * sin(pitch),
+        row[2] - GRAVITY * sin(roll) * cos(pitch),
+        row[3] - GRAVITY * cos(roll) * cos(pitch),
+    )
+
+
+def _sample(
+    row: Sequence[float], is_force: bool, extras: Extras, line: int, fields: Sequence[str]
+) -> RecordedSample:
+    t, ax, ay, az, p, q, r, v, roll, pitch = row
+    acceleration = _kinematic(row) if is_force else (ax, ay, az)
+    if not extras.any:
+        return RecordedSample(t, acceleration, (p, q, r), v, (roll, pitch))
+    return RecordedSample(
+        t,
+        acceleration,
+        (p, q, r),
+        v,
+        (roll, pitch),
+        extras.mode(line, fields),
+        extras.driver(line, fields),
+        extras.preview(line, fields),
+        extras.value("sender_time_s", line, fields),
+        extras.value("sim_time_s", line, fields),
+    )

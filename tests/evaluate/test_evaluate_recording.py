@@ -43,7 +43,7 @@ def test_columns_may_stand_in_any_order_beside_others(tmp_path):
 @pytest.mark.parametrize(
     ("text", "line", "column", "message"),
     [
-        (f"{HEADER.replace('pitch', 'nick')}\n{GOOD}", 1, "pitch", "0 times"),
+        (f"{HEADER.replace('az', 'up')}\n{GOOD}", 1, "az", "0 times"),
         (f"{HEADER},t\n{GOOD}", 1, "t", "2 times"),
         (f"{HEADER}\n{GOOD}0.02,1,2,3,0.1,nonsense,0.3,5,0,0\n", 4, "q", "'nonsense'"),
         (f"{HEADER}\n{GOOD}0.02,inf,2,3,0.1,0,0.3,5,0,0\n", 4, "ax", "not a finite number"),
