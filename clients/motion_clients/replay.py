@@ -53,6 +53,7 @@ def replay(
     key: bytes | None = None,
     clock_ns: Callable[[], int] = time.monotonic_ns,
     sleep: Callable[[float], None] = time.sleep,
+    tell: Callable[[str], None] | None = None,
 ) -> ReplayCounts:
     """Send a recording's samples on an absolute grid of their recorded times.
 
@@ -67,10 +68,12 @@ def replay(
         speed: 2 is twice as fast as recorded.
         stop: Ends the replay when it is set or returns true.
         loop: Begin again at the end, until stopped.
-        preview: Horizon of the recording's own future to send along [s]; native only.
+        preview: Horizon of the recording's own future to send along [s]; native only. With 0,
+            what a recording of the server holds of it is sent.
         key: Secret shared with the server; native only.
         clock_ns: Monotonic clock [ns].
         sleep: Waits for a duration [s].
+        tell: Called with a line for whatever looks wrong in the recording.
 
     Raises:
         RecordingError: The file cannot be read.
@@ -79,6 +82,9 @@ def replay(
     """
     _check(fmt, speed, preview, port, key)
     recording = read_recording(path)
+    if tell is not None:
+        for warning in recording.warnings:
+            tell(f"{recording.path.name}: warning: {warning}")
     has_stopped = _stop_function(stop)
     sent = unsent = skipped = rounds = 0
     round_length = recording.duration + recording.period
@@ -185,14 +191,30 @@ def _sender(
             speed=sample.speed,
             attitude=sample.attitude,
             sim_time_ns=round(elapsed * 1e9),
-            mode=Mode.DRIVE if round_ == last_round else Mode.TELEPORT,
+            mode=_mode_of(sample) if round_ == last_round else Mode.TELEPORT,
             flags=Flags.REPLAY,
-            preview=preview_of(recording, sample, preview),
+            preview=preview_of(recording, sample, preview) if preview else told_ahead(sample),
+            driver=sample.driver,
         )
         last_round = round_
         return cue.unsent == before
 
     return send_native
+
+
+def _mode_of(sample: RecordedSample) -> Mode:
+    """As recorded; whoever took leave then does not take leave of this replay."""
+    return Mode.PAUSE if sample.mode is Mode.BYE else sample.mode
+
+
+def told_ahead(sample: RecordedSample) -> Preview | None:
+    """What the recorded sender told ahead, on even steps; None if nothing."""
+    told = sample.preview[:PREVIEW_MAX]
+    if not told:
+        return None
+    first, last = told[0].time, told[-1].time
+    step = (last - first) / (len(told) - 1) if len(told) > 1 else _PREVIEW_DT
+    return Preview(step, first, tuple((*one.acceleration, *one.rates) for one in told))
 
 
 def preview_of(recording: Recording, sample: RecordedSample, horizon: float) -> Preview | None:

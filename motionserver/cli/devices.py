@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
@@ -84,7 +85,16 @@ def replay(recording: str, to: str, form: str, loop: bool, preview: float) -> st
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     try:
-        counts = send_recording(path, host, port, fmt=form, stop=stop, loop=loop, preview=preview)
+        counts = send_recording(
+            path,
+            host,
+            port,
+            fmt=form,
+            stop=stop,
+            loop=loop,
+            preview=preview,
+            tell=lambda text: print(text, file=sys.stderr, flush=True),  # noqa: T201
+        )
     except RecordingError as error:
         raise ConfigError("INPUT.csv", str(error), "Correct the file.") from error
     except ValueError as error:

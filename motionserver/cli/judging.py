@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from motionserver.cli.commands import app
-from motionserver.cli.modes import EVALUATE, TUNE_PREDICTOR, refuse_idle
+from motionserver.cli.modes import EVALUATE, TUNE_PREDICTOR, refuse_idle, written
 
 Platform = Annotated[str, typer.Option("--platform", help="preset or file", metavar="PRESET|FILE")]
 Head = Annotated[
@@ -121,6 +121,7 @@ def evaluate(
         setpoints,
         json_out,
         html_out,
+        written(context),
     )
     if compare is not None:
         raise typer.Exit(comparison.compare(compare, out, options))
@@ -195,6 +196,8 @@ def tune(
         "scale": scale, "search_scale": search_scale, "tilt_rate_deg_s": tilt_rate,
         "sickness_weight": sickness_weight, "jobs": jobs,
     }  # fmt: skip
+    if "platform" not in written(context):
+        del options["platform"]
     raise typer.Exit(run_tune(recordings, out, head, **options))
 
 

@@ -22,6 +22,16 @@ TUNE_PREDICTOR: Final = {"--predictor": frozenset({"recordings", "out", "predict
 """Parameters of `tune` when it fits a predictor; a search takes all."""
 
 
+def written(context: typer.Context) -> frozenset[str]:
+    """Names of the parameters that were written at the prompt."""
+    sources = (
+        (p.name or "", context.get_parameter_source(p.name or "")) for p in context.command.params
+    )
+    return frozenset(
+        name for name, source in sources if source is not None and source.name == "COMMANDLINE"
+    )
+
+
 def refuse_idle(
     context: typer.Context, mode: str, modes: dict[str, frozenset[str]], rest: str = ""
 ) -> None:
@@ -36,10 +46,10 @@ def refuse_idle(
     Raises:
         ConfigError: Something is given that this mode does not take.
     """
+    told = written(context)
     for parameter in context.command.params:
         name = parameter.name or ""
-        source = context.get_parameter_source(name)
-        if source is None or source.name != "COMMANDLINE" or name in modes[mode]:
+        if name not in told or name in modes[mode]:
             continue
         takers = [other for other, takes in modes.items() if name in takes]
         takers += [rest] if rest else []

@@ -7,22 +7,24 @@ from pathlib import Path
 
 from motionserver.evaluate.command import evaluate
 from motionserver.evaluate.options import EvaluateOptions
+from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.report import to_text
 
 
 def run_evaluate(recording: Path, options: EvaluateOptions) -> int:
     """Evaluate and print; 1 if any limit was broken."""
-    machine, tuning = options.machine(), options.tuning()
+    drive = read_recording(recording)
+    names, machine, tuning, planner_hz = options.for_drive(drive.live)
     result = evaluate(
-        recording,
-        options.algorithms(),
+        drive,
+        names,
         machine,
         rate=options.rate,
         setpoints=options.setpoints,
         json_out=options.json_out,
         html_out=options.html_out,
         tuning=tuning,
-        planner_hz=options.planner_hz,
+        planner_hz=planner_hz,
         preview=options.preview,
         disturbance=options.disturbance(),
         jobs=options.jobs,
@@ -35,13 +37,23 @@ def run_predictions(recording: Path, options: EvaluateOptions) -> int:
     """Print how well each reference model foretells a recording."""
     from motionserver.cueing.reference import MODELS
     from motionserver.evaluate.predictions import predictions, to_text
-    from motionserver.evaluate.recording import read_recording
+    from motionserver.evaluate.progress import Progress
 
-    tuning = options.tuning()
-    # a recording holds no pedals: the model that needs them would be another one's double
-    models = [name for name in MODELS if name != "vehicle"]
+    drive = read_recording(recording)
+    tuning = options.for_drive(drive.live)[2]
+    # without pedals the model that needs them would be another one's double
+    models = [name for name in MODELS if name != "vehicle" or drive.drivers is not None]
+    progress = Progress(drive.name, 1.0)
+    for warning in drive.warnings:
+        progress.line(f"warning: {warning}")
     found = predictions(
-        read_recording(recording), models, predictor=tuning.predictor, scale=tuning.scale
+        drive,
+        models,
+        predictor=tuning.predictor,
+        scale=tuning.scale,
+        drivers=drive.drivers,
+        progress=lambda model, share: progress.at(share, model),
     )
+    progress.close()
     sys.stdout.write(to_text(found))
     return 0

@@ -9,12 +9,15 @@ import signal
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 from motionserver.cli.serving import NotRunningError
 from motionserver.core.limits import machine_from_mapping
 from motionserver.cueing.registry import algorithms
 from motionserver.errors import ConfigError
 from motionserver.settings.config import load_config, run_dir_of
+from motionserver.telemetry.blackbox.room import FOLDER
+from motionserver.telemetry.cue_history import CueReader
 from motionserver.telemetry.link import GuardClock, Maps
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
 from motionserver.telemetry.ticker import now_ns
@@ -50,7 +53,13 @@ def record(path: Path | None, out: Path, seconds: float | None) -> str:
     with contextlib.suppress(OSError):
         os.nice(_POLITE)
     names = algorithms()
-    recorder = Recorder(maps, machine_from_mapping(shown["machine"]), names)
+    recorder = Recorder(
+        maps,
+        machine_from_mapping(shown["machine"]),
+        names,
+        CueReader(run_dir / FOLDER),
+        settings_of(shown),
+    )
     begun = time.monotonic()
 
     def is_over() -> bool:
@@ -61,4 +70,20 @@ def record(path: Path | None, out: Path, seconds: float | None) -> str:
         recorder, names, out, now_ns=now_ns, pause=lambda s: time.sleep(s), is_over=is_over
     )
     took = time.monotonic() - begun
-    return f"{recorder.rows} rows in {took:.1f} s to {out}; {why}"
+    missed = f" ({recorder.missed} more came too fast)" if recorder.missed else ""
+    return (
+        f"{recorder.rows} rows and {recorder.cue_rows} of the simulator{missed} in {took:.1f} s "
+        f"to {out}; {why}"
+    )
+
+
+def settings_of(shown: dict[str, Any]) -> dict[str, Any]:
+    """What a drive is judged by later, of what the processes were told."""
+    planner = shown["planner"]
+    return {
+        "machine": shown["machine"],
+        "vehicle_head_m": planner["arm"],
+        "planner_period_s": planner["period"],
+        "budget_s": planner["budget"],
+        "platform_rate_hz": shown["platform"]["rate_hz"],
+    }

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Final
 
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
@@ -18,16 +18,22 @@ from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.page import to_html
+from motionserver.evaluate.progress import WEIGHTS, Progress
 from motionserver.evaluate.ranges import check_algorithms, check_scale, check_times
-from motionserver.evaluate.recording import read_recording
+from motionserver.evaluate.recording import Recording, read_all
 from motionserver.evaluate.result import EvaluateResult, to_json
 from motionserver.evaluate.setpoints import write_setpoints
 from motionserver.evaluate.yardstick import find_yardstick
 from motionserver.settings.machine import load_machine
 
+YARDSTICK: Final = 5.0
+"""How long the yardstick's search takes beside one classical drive, in two processes."""
+HINDSIGHT: Final = 4.0
+"""The same of the search in hindsight."""
+
 
 def evaluate(
-    input_csv: str | Path,
+    input_csv: str | Path | Recording,
     algorithms: Sequence[str] = ("mpc", "thondel2014", "classical"),
     machine: Machine | None = None,
     scale: float | None = None,
@@ -48,7 +54,7 @@ def evaluate(
     Progress goes to standard error. `motionserver.evaluate.report.to_text` gives the table.
 
     Args:
-        input_csv: The recording.
+        input_csv: The recording, or its file.
         algorithms: Names, in the order of the table.
         machine: Platform; the preset t2-compact if None.
         scale: Share of the motion that is wanted, above 0 and at most 1; the tuning's if None.
@@ -85,13 +91,18 @@ def evaluate(
         )
     for option, path in (("--setpoints", setpoints), ("--json", json_out), ("--html", html_out)):
         check_file(option, path)
-    recording = read_recording(input_csv)
+    recording = read_all([input_csv])[0]
 
-    def tell(text: str) -> None:
-        if not quiet:
-            print(f"{recording.name}: {text}", file=sys.stderr, flush=True)  # noqa: T201
+    sizes = [WEIGHTS.get(name, 1.0) for name in algorithms]
+    progress = Progress(recording.name, sum(sizes) + YARDSTICK + HINDSIGHT, quiet=quiet)
+    for warning in recording.warnings:
+        progress.line(f"warning: {warning}")
+    if recording.live is not None:
+        progress.line(recording.live.described())
+    begin = 0.0
 
-    def driven(name: str) -> Drive:
+    def driven(name: str, size: float) -> Drive:
+        nonlocal begin
         begun = perf_counter()
         out = drive(
             machine,
@@ -101,15 +112,26 @@ def evaluate(
             planner_hz=planner_hz,
             preview=preview,
             disturbance=disturbance,
+            progress=progress.part(begin, size, name),
         )
-        tell(f"{name}: {recording.duration:.1f} s driven in {perf_counter() - begun:.1f} s")
+        begin += size
+        progress.line(
+            f"{name}: {recording.duration:.1f} s driven in {perf_counter() - begun:.1f} s"
+        )
         return out
 
-    drives = [driven(name) for name in algorithms]
+    drives = [driven(name, size) for name, size in zip(algorithms, sizes, strict=True)]
     if setpoints is not None:
         write_setpoints(drives[0], setpoints)
     yardstick = find_yardstick(
-        machine, recording, base, rate=rate, planner_hz=planner_hz, jobs=jobs, tell=tell
+        machine,
+        recording,
+        base,
+        rate=rate,
+        planner_hz=planner_hz,
+        jobs=jobs,
+        tell=progress.line,
+        progress=progress.part(begin, YARDSTICK, "yardstick"),
     )
     hindsight = find_hindsight(
         machine,
@@ -118,8 +140,10 @@ def evaluate(
         rate=rate,
         planner_hz=planner_hz,
         yardstick=yardstick,
-        tell=tell,
+        tell=progress.line,
+        progress=progress.part(begin + YARDSTICK, HINDSIGHT, "hindsight"),
     )
+    progress.close()
     still = no_motion(machine, recording, base.scale, rate)
     drives += [yardstick.drive, hindsight.drive, still]
     result = EvaluateResult(

@@ -11,10 +11,12 @@ from motionserver.core.axes import GRAVITY, Array, frozen
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.kinematics.rotation import felt, transfer
 from motionserver.core.limits import Machine
+from motionserver.core.state import DriveMode
 from motionserver.evaluate.recording import Recording
 
 RATE_HZ: Final = 500.0
 """Rate of the executed samples unless told otherwise [Hz]."""
+_STILL: Final = (DriveMode.PAUSE, DriveMode.BYE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +142,11 @@ def wanted_at(
     if vehicle_head is not None and np.any(vehicle_head):
         spin = np.gradient(recording.rates, recording.times, axis=0)
         force = transfer(force, recording.rates, spin, vehicle_head)
-    force = force - np.array([0.0, 0.0, GRAVITY])
-    columns = [np.interp(times, recording.times, c) for c in (*force.T, *recording.rates.T)]
+    force, rates = force - np.array([0.0, 0.0, GRAVITY]), recording.rates
+    if recording.modes is not None:
+        # while the simulation pauses there is nothing to feel
+        still = np.array([mode in _STILL for mode in recording.modes])[:, None]
+        force, rates = np.where(still, 0.0, force), np.where(still, 0.0, rates)
+    columns = [np.interp(times, recording.times, c) for c in (*force.T, *rates.T)]
     both = scale * np.column_stack(columns)
     return frozen(both[:, :3]), frozen(both[:, 3:])

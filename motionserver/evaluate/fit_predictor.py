@@ -8,7 +8,7 @@ mean error among what harms none of them, so a correction that holds on no other
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -57,7 +57,12 @@ class _Sums:
     """Mean square of what was missed, (2, M)."""
 
 
-def fit(recordings: Sequence[Recording], name: str, note: str = "") -> Predictor:
+def fit(
+    recordings: Sequence[Recording],
+    name: str,
+    note: str = "",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Predictor:
     """Fit a predictor.
 
     Args:
@@ -65,6 +70,7 @@ def fit(recordings: Sequence[Recording], name: str, note: str = "") -> Predictor
             turn instead.
         name: What it is called.
         note: What should be known about the recordings.
+        progress: Called with what is being done, recordings condensed, recordings in all.
 
     Returns:
         The predictor; its provenance tells the errors on what was left out, chosen without
@@ -82,7 +88,13 @@ def fit(recordings: Sequence[Recording], name: str, note: str = "") -> Predictor
                 f"recording {recording.name}: {recording.duration:.1f} s is too short to fit to; "
                 f"it needs {parts * SHORTEST:g} s"
             )
-    sums = [one for recording in recordings for one in _condense(recording, parts)]
+    sums: list[_Sums] = []
+    for number, recording in enumerate(recordings):
+        if progress is not None:
+            progress("forecast", number, len(recordings))
+        sums += _condense(recording, parts)
+    if progress is not None:
+        progress("forecast", len(recordings), len(recordings))
     everything = list(range(len(sums)))
     one_vehicle = len(recordings) == 1 or len(recordings) >= ENOUGH
     extras = EXTRAS if one_vehicle else (WITHOUT,)

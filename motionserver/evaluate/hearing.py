@@ -11,7 +11,7 @@ from motionserver.core.axes import Array, frozen
 from motionserver.core.intake.freshness import SECOND_NS
 from motionserver.core.intake.gate import Gate
 from motionserver.core.intake.intake import Intake
-from motionserver.core.state import Preview, VehicleMotion
+from motionserver.core.state import DriveMode, Preview, VehicleMotion
 from motionserver.evaluate.recording import Recording
 
 PREVIEW_STEP: Final = 0.01
@@ -26,7 +26,7 @@ class Hearing:
 
     Args:
         recording: The drive.
-        preview: How far it is told ahead [s]; 0 for none.
+        preview: How far it is told ahead [s]; 0 for what its sender itself told.
         gate: Believes or refuses.
         intake: Takes what is believed.
         refused: Counts what is not.
@@ -67,7 +67,9 @@ class Hearing:
                 recording.force[given],
                 recording.rates[given],
                 float(recording.speed[given]),
-                preview=self._preview(given) if len(self._steps) else None,
+                mode=DriveMode.DRIVE if recording.modes is None else recording.modes[given],
+                preview=self._preview(given) if len(self._steps) else self._recorded(given),
+                driver=None if recording.drivers is None else recording.drivers[given],
             )
             refusal = self._gate.refuse("recording", recording.name, motion)
             if refusal is None:
@@ -75,6 +77,11 @@ class Hearing:
             else:
                 self._refused[refusal] += 1
             self._given += 1
+
+    def _recorded(self, given: int) -> Preview | None:
+        """What the sender itself told ahead."""
+        previews = self._recording.previews
+        return None if previews is None else previews[given]
 
     def _preview(self, given: int) -> Preview | None:
         """What the recording holds after sample ``given``, as far as it goes."""

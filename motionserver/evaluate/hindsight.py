@@ -16,6 +16,7 @@ from motionserver.evaluate.drive import RATE_HZ, Drive
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import rmse_xy
 from motionserver.evaluate.metrics.workspace import workspace_figures
+from motionserver.evaluate.progress import Share
 from motionserver.evaluate.recording import Recording
 from motionserver.evaluate.screen import Screen, Washout
 from motionserver.evaluate.yardstick import Yardstick, find_yardstick
@@ -32,6 +33,8 @@ GAINS: Final = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0)
 DRIVEN: Final = 3
 """How many of the screen's best are driven through the server."""
 _INSPECTED: Final = 12
+_SCREENING: Final = 0.3
+"""Share of the time that the screen takes, about."""
 HINDSIGHT_RULE: Final = (
     "classical washout with gain and corners chosen on this very recording: surge and sway "
     f"high-pass {', '.join(f'{h:g}' for h in HIGHS)} x tilt low-pass "
@@ -104,6 +107,7 @@ def find_hindsight(
     planner_hz: float = PLANNER_HZ,
     yardstick: Yardstick | None = None,
     tell: Told | None = None,
+    progress: Share | None = None,
 ) -> Hindsight:
     """Search corners and gain; whatever the yardstick may choose from is among the choices.
 
@@ -117,26 +121,39 @@ def find_hindsight(
         rate: Rate of the executed samples [Hz].
         planner_hz: Planner rate of the server's drives [Hz].
         yardstick: That of this recording, tuning and rates; searched if None.
-        tell: Called with a line of progress.
+        tell: Called with a line for the result.
+        progress: Called with the share done.
 
     Returns:
         The best of all.
     """
     if yardstick is None:
         yardstick = find_yardstick(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+    share = (lambda done: None) if progress is None else progress
+    share(0.0)
     screen = Screen(machine, recording, tuning, HIGHS, LOWS, GAINS)
-    trials = [
-        Trial(washout, *screen.judge(washout))
-        for washout in (Washout(h, low, g) for h in HIGHS for low in LOWS for g in GAINS)
-    ]
+    sets = [Washout(h, low, g) for h in HIGHS for low in LOWS for g in GAINS]
+    trials = []
+    for number, washout in enumerate(sets):
+        share(_SCREENING * number / len(sets))
+        trials.append(Trial(washout, *screen.judge(washout)))
     # if nothing is inside, the governor may still make something of the smallest gains
     trials.sort(key=lambda t: (not t.inside, t.rmse if t.inside else t.washout.gain, t.rmse))
     shown = _first_inside(screen, trials, rate)
     best = None if shown is None else rmse_xy(shown[1])
     washouts = [trial.washout for trial in trials[:DRIVEN]]
+    each = (1.0 - _SCREENING) / len(washouts)
     drives = [
-        _through_server(machine, recording, tuning, washout, rate, planner_hz)
-        for washout in washouts
+        _through_server(
+            machine,
+            recording,
+            tuning,
+            washout,
+            rate,
+            planner_hz,
+            lambda part, k=k: share(_SCREENING + each * (k + part)),  # type: ignore[misc]
+        )
+        for k, washout in enumerate(washouts)
     ]
     washouts.append(_standard(yardstick.gain))
     drives.append(yardstick.drive)
@@ -179,8 +196,17 @@ def _through_server(
     washout: Washout,
     rate: float,
     planner_hz: float,
+    progress: Share,
 ) -> Drive:
     chosen = replace(tuning, algorithm=Classical.name, gain=washout.gain)
     thinker = Thinker(machine, chosen, 1.0 / planner_hz, machine.parked_pose[None])
     thinker.cueing = Classical(machine, chosen, 1.0 / planner_hz, washout.filters())
-    return drive(machine, recording, chosen, rate=rate, planner_hz=planner_hz, thinker=thinker)
+    return drive(
+        machine,
+        recording,
+        chosen,
+        rate=rate,
+        planner_hz=planner_hz,
+        thinker=thinker,
+        progress=progress,
+    )

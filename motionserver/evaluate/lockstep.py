@@ -75,8 +75,9 @@ def drive(
 ) -> Drive:
     """Drive a recording through gate, intake, planner, governor, verification and player.
 
-    It begins at neutral, running, without fade-in, and ends with the last sample. Every plan takes
-    over one planner period after it was begun, as it does live.
+    It begins at neutral, running, and ends with the last sample; without fade-in, and every plan
+    takes over one planner period after it was begun. What `motionserver record` wrote fades in and
+    takes over as it did live, by a planner that is never late.
 
     Args:
         machine: Geometry and hard limits.
@@ -107,7 +108,10 @@ def drive(
     head = Head(np.zeros(3) if vehicle_head is None else vehicle_head, tuning.scale)
     mind = Thinker(machine, tuning, period, homes) if thinker is None else thinker
     playback = Playback(_standing(machine, homes))
-    intake, gate, log = Intake(gain=1.0), Gate(), _Log()
+    live = recording.live
+    # a live drive fades in, and its plans take over at the next packet to the platform
+    lead = period if live is None else min(live.lead, period)
+    intake, gate, log = Intake(gain=1.0 if live is None else 0.0), Gate(), _Log()
 
     samples = int(np.floor(recording.duration * rate + 1e-6)) + 1
     states = np.empty((samples, 18))
@@ -126,7 +130,7 @@ def drive(
         before = perf_counter()
         parent = playback.newest
         thought = mind.think(
-            parent.plan, parent.before, playback.newest_clock + period, wanted, number + 1
+            parent.plan, parent.before, playback.newest_clock + lead, wanted, number + 1
         )
         log.seconds.append(perf_counter() - before)
         log.times.append(start)

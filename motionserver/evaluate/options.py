@@ -17,6 +17,7 @@ from motionserver.cueing.tuning import Tuning
 from motionserver.errors import ConfigError
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.drive import RATE_HZ
+from motionserver.evaluate.live import Live
 from motionserver.evaluate.lockstep import PLANNER_HZ
 from motionserver.evaluate.ranges import check_scale, check_times
 from motionserver.settings.fields import TuningError
@@ -53,6 +54,7 @@ class EvaluateOptions:
         setpoints: File for set-points, or None.
         json_out: File for figures, or None.
         html_out: File for the page, or None.
+        told: Names of the options that were written; the others may be as a live drive was.
 
     Raises:
         ConfigError: A rate or the preview is out of range.
@@ -75,6 +77,7 @@ class EvaluateOptions:
     setpoints: Path | None = None
     json_out: Path | None = None
     html_out: Path | None = None
+    told: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         check_times(self.rate, self.planner_hz, self.preview)
@@ -90,6 +93,26 @@ class EvaluateOptions:
     def tuning(self) -> Tuning:
         """All tunables."""
         return tuning_from(self.machine(), self.preset, self.reference, self.tilt_rate, self.scale)
+
+    def for_drive(self, live: Live | None) -> tuple[list[str], Machine, Tuning, float]:
+        """Algorithms, machine, tunables and planner rate: what is not told as it was live."""
+        if live is None:
+            return self.algorithms(), self.machine(), self.tuning(), self.planner_hz
+        machine = self.machine() if "platform" in self.told else machine_at(live.machine, self.head)
+        names, own = self.algorithms(), str(live.tuning.get("algorithm", ""))
+        if "algorithm" not in self.told:
+            names = [own, *(name for name in names if name != own)]
+        where, values = (
+            ("--tuning " + self.preset, _values(self.preset))
+            if self.preset
+            else (
+                "the recording's settings",
+                live.tuning,
+            )
+        )
+        tuning = _tuning(machine, values, where, self.reference, self.tilt_rate, self.scale)
+        rate = self.planner_hz if "planner_rate" in self.told else live.planner_hz
+        return names, machine, tuning, rate
 
     def disturbance(self) -> Disturbance | None:
         """The trouble, if any is wanted."""
@@ -146,7 +169,18 @@ def tuning_from(
     Raises:
         ConfigError: One of them is wrong.
     """
-    values: dict[str, Any] = _values(preset) if preset else {}
+    values = _values(preset) if preset else {}
+    return _tuning(machine, values, f"--tuning {preset}", reference, tilt_rate, scale)
+
+
+def _tuning(
+    machine: Machine,
+    values: dict[str, Any],
+    where: str,
+    reference: str,
+    tilt_rate: str,
+    scale: float | None,
+) -> Tuning:
     if reference:
         if reference not in MODELS:
             raise ConfigError(
@@ -154,12 +188,12 @@ def tuning_from(
                 f"unknown model {reference!r}",
                 f"Allowed: {', '.join(MODELS)}; what comes ahead is told by --preview.",
             )
-        values["reference"] = reference
+        values = {**values, "reference": reference}
     try:
         model = apply_changes(default_for(machine), values)
         model.check_machine(machine)
     except TuningError as error:
-        raise ConfigError(f"--tuning {preset}", str(error), "Correct this value.") from error
+        raise ConfigError(where, str(error), "Correct this value.") from error
     tuning = model.to_tuning()
     if tilt_rate:
         tuning = replace(tuning, tilt_rate=_rate(tilt_rate))

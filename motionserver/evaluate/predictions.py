@@ -19,6 +19,7 @@ from motionserver.core.state import Driver, Stimulus
 from motionserver.cueing.predictor import Predictor
 from motionserver.cueing.reference import MODELS, Reference
 from motionserver.cueing.reference_learned import Learned
+from motionserver.evaluate.progress import Share
 from motionserver.evaluate.recording import Recording, from_samples
 
 HORIZONS: Final = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
@@ -31,6 +32,7 @@ SETTLE: Final = 3.0
 """Left out at the beginning, while models learn [s]."""
 QUIET: Final = 0.02
 """An axis with less than this is not judged: there is nothing to foretell [m/s2]."""
+_SECOND: Final = round(1.0 / PERIOD)
 Forecaster = Callable[[Stimulus], Array]
 """Newest stimulus -> surge and sway at the horizons, (K, 2) or wider."""
 
@@ -58,8 +60,9 @@ def predictions(
     *,
     predictor: str = "truck",
     scale: float = 1.0,
-    drivers: Sequence[Driver] | None = None,
+    drivers: Sequence[Driver | None] | None = None,
     horizons: Sequence[float] = HORIZONS,
+    progress: Callable[[str, float], None] | None = None,
 ) -> PredictionErrors:
     """Forecast a recording with every model and compare.
 
@@ -70,6 +73,7 @@ def predictions(
         scale: Share of the motion that is wanted; the figures hardly depend on it.
         drivers: What the driver did, one for each sample of the recording.
         horizons: How far ahead [s].
+        progress: Called with the model that forecasts and the share of all that is done.
 
     Raises:
         ValueError: A model or predictor does not exist, or drivers and samples differ in number.
@@ -78,9 +82,14 @@ def predictions(
         raise ValueError(f"{len(drivers)} drivers for {len(recording.times)} samples")
     ahead = np.array(horizons)
     rows = []
-    for name in models:
+    for number, name in enumerate(models):
+
+        def share(part: float, number: int = number, name: str = name) -> None:
+            if progress is not None:
+                progress(name, (number + part) / len(models))
+
         model = Reference(name, PERIOD, ahead, 0.0, predictor)
-        rows.append(forecast_errors(recording, model.predict, ahead, scale, drivers))
+        rows.append(forecast_errors(recording, model.predict, ahead, scale, drivers, share))
     return PredictionErrors(recording.name, tuple(horizons), tuple(models), frozen(rows))
 
 
@@ -95,12 +104,18 @@ def forecast_errors(
     forecaster: Forecaster,
     horizons: Array,
     scale: float = 1.0,
-    drivers: Sequence[Driver] | None = None,
+    drivers: Sequence[Driver | None] | None = None,
+    share: Share | None = None,
 ) -> Array:
     """Relative errors of one forecaster, surge and sway, (2, K); NaN where all is quiet."""
     drive = regular(recording)
     stimuli = stimuli_of(drive, scale, _nearest(recording, drive, drivers))
-    told = np.stack([forecaster(one)[:, :2] for one in stimuli]) / scale
+    told = np.empty((len(stimuli), len(horizons), 2))
+    for k, one in enumerate(stimuli):
+        if share is not None and k % _SECOND == 0:
+            share(k / len(stimuli))
+        told[k] = forecaster(one)[:, :2]
+    told /= scale
     return relative_errors(told, drive, horizons)
 
 
@@ -141,7 +156,7 @@ def regular(recording: Recording) -> Recording:
 
 
 def stimuli_of(
-    drive: Recording, scale: float = 1.0, drivers: Sequence[Driver] | None = None
+    drive: Recording, scale: float = 1.0, drivers: Sequence[Driver | None] | None = None
 ) -> list[Stimulus]:
     """What intake would make of a regular drive, one for each period."""
     force = scale * (drive.force - np.array([0.0, 0.0, GRAVITY]))
@@ -178,8 +193,8 @@ def _cell(value: float) -> str:
 
 
 def _nearest(
-    recording: Recording, drive: Recording, drivers: Sequence[Driver] | None
-) -> list[Driver] | None:
+    recording: Recording, drive: Recording, drivers: Sequence[Driver | None] | None
+) -> list[Driver | None] | None:
     """The newest word of the driver at every instant of the regular drive."""
     if drivers is None:
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import wait
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -12,6 +13,7 @@ from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.drive import RATE_HZ, Drive
 from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import rmse_xy
+from motionserver.evaluate.progress import Share
 from motionserver.evaluate.recording import Recording
 from motionserver.evaluate.worker_pool import worker_pool
 
@@ -19,6 +21,10 @@ COARSE: Final = (0.2, 0.4, 0.6, 0.8, 1.0)
 """Gains tried first."""
 STEPS: Final = (0.1, 0.05)
 """Then to both sides of the best."""
+MOST_DRIVES: Final = len(COARSE) + 2 * len(STEPS)
+"""Drives that a search takes at most."""
+_LOOK: Final = 2.0
+"""Between two looks at other processes [s]."""
 RULE: Final = (
     "classical washout under the same limits and governor, with the gain in (0, 1] of least "
     "RMSE(x, y) on this very recording: tried 0.2, 0.4, 0.6, 0.8, 1.0, then 0.1 and 0.05 to both "
@@ -53,6 +59,7 @@ def find_yardstick(
     planner_hz: float = PLANNER_HZ,
     jobs: int = 1,
     tell: Told | None = None,
+    progress: Share | None = None,
 ) -> Yardstick:
     """Search the gain; the result does not depend on ``jobs``.
 
@@ -63,7 +70,8 @@ def find_yardstick(
         rate: Rate of the executed samples [Hz].
         planner_hz: Planner rate [Hz].
         jobs: Processes that drive at the same time.
-        tell: Called with a line of progress.
+        tell: Called with a line for every round of gains.
+        progress: Called with the share done.
 
     Returns:
         The yardstick.
@@ -75,7 +83,13 @@ def find_yardstick(
     for step in (0.0, *STEPS):
         asked = COARSE if step == 0.0 else (best_gain - step, best_gain + step)
         gains = tuple(g for g in (round(a, 6) for a in asked) if 0.0 < g <= 1.0 and g not in tried)
-        for gain, driven in zip(gains, _all(run, gains, jobs), strict=True):
+        done = len(tried)
+
+        def share(part: float, done: int = done) -> None:
+            if progress is not None:
+                progress(min(1.0, (done + part) / MOST_DRIVES))
+
+        for gain, driven in zip(gains, _all(run, gains, jobs, share), strict=True):
             tried[gain] = rmse_xy(driven)
             # a tie goes to the smaller gain, whatever the order of trial
             if best is None or (tried[gain], gain) < (tried[best_gain], best_gain):
@@ -100,11 +114,21 @@ def yardstick_of(
     return Yardstick(gain, replace(driven, name="yardstick"), ((gain, rmse_xy(driven)),))
 
 
-def _all(run: Callable[[float], Drive], gains: tuple[float, ...], jobs: int) -> list[Drive]:
+def _all(
+    run: Callable[..., Drive], gains: tuple[float, ...], jobs: int, share: Share
+) -> list[Drive]:
+    """Drives of all gains; ``share`` is told how many are done, as a number of drives."""
     if jobs <= 1 or len(gains) < 2:
-        return [run(gain) for gain in gains]
+        return [
+            run(gain, progress=lambda part, k=k: share(k + part)) for k, gain in enumerate(gains)
+        ]
     with worker_pool(min(jobs, len(gains))) as pool:
-        return list(pool.map(run, gains))
+        futures = [pool.submit(run, gain) for gain in gains]
+        running = set(futures)
+        while running:
+            running = wait(running, timeout=_LOOK).not_done
+            share(len(futures) - len(running))
+        return [future.result() for future in futures]
 
 
 def _drive(
@@ -114,6 +138,7 @@ def _drive(
     rate: float,
     planner_hz: float,
     gain: float,
+    progress: Share | None = None,
 ) -> Drive:
     washout = replace(tuning, algorithm="classical", gain=gain)
-    return drive(machine, recording, washout, rate=rate, planner_hz=planner_hz)
+    return drive(machine, recording, washout, rate=rate, planner_hz=planner_hz, progress=progress)

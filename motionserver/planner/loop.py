@@ -34,6 +34,8 @@ from motionserver.planner.tuner import Tuner
 from motionserver.planner.wake import next_wake
 from motionserver.planner.wake_ahead import MARGIN_NS, WakeAhead
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
+from motionserver.telemetry.blackbox.room import FOLDER
+from motionserver.telemetry.cue_history import CueNotes
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
@@ -80,6 +82,7 @@ class PlannerLoop:
         self._timing = Timing(int(options.period * SECOND))
         self._view = PlannerView()
         self._box = PlannerBox(run_dir)
+        self._cues = CueNotes(run_dir / FOLDER)
         self._seldom = Seldom(log)
         # a guard of short ticks needs some of them for its verdict
         tick = options.send_period / ticks_per_send(1.0 / options.send_period)
@@ -144,6 +147,7 @@ class PlannerLoop:
     def _step(self, now: int) -> None:
         vehicle, sensor = self._inputs.poll()
         self._box.packets((*vehicle, *sensor))
+        self._cues.note(vehicle)
         for motion in vehicle:
             self._intake.offer(motion)
         self._state = self._clock.read(now)

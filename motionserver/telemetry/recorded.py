@@ -1,12 +1,13 @@
 """The file that `motionserver record` writes, and its reader.
 
-Comma-separated values, UTF-8: one header line, then one row per packet to the platform. An empty
-field means that nobody said it: no plan yet, a planner that is away, an engine that did not run.
+Comma-separated values, UTF-8: one header line, then one row per packet to the platform and one per
+believed packet of the simulator, as they come. An empty field means that nobody said it: no plan
+yet, a planner that is away, an engine that did not run, or a row of the other kind.
 
 | column | meaning |
 |---|---|
 | time_s | instant of the packet, from the first row [s] |
-| state | motion state of the guard: PARKED, RUN, HOLD ... |
+| state | motion state of the guard: PARKED, RUN, HOLD ...; empty in rows of the simulator |
 | surge_m sway_m heave_m | commanded position of the motion reference point from neutral [m] |
 | roll_rad pitch_rad yaw_rad | commanded attitude, Rz(yaw) Ry(pitch) Rx(roll), + pitch nose down |
 | leg_1_m .. leg_6_m | leg lengths of that pose, pin to pin [m] |
@@ -16,10 +17,20 @@ field means that nobody said it: no plan yet, a planner that is away, an engine 
 | kappa | share of its candidate in its plan, 0..1 |
 | NAME_x_m_s2 .. z | what the side engine NAME would let feel [m/s2] |
 | NAME_kappa | share of its candidate in its plan |
+| t | instant of the simulator's packet on the clock of time_s, see `cue_clock` [s] |
+| ax ay az | kinematic acceleration of the vehicle, gravity removed by roll and pitch [m/s2] |
+| p q r v | body rates [rad/s], forward speed [m/s] |
+| roll pitch | attitude of the vehicle, 0 where the simulator tells none [rad] |
+| mode | drive, pause, teleport or bye |
+| throttle brake clutch steering gear | driver inputs: 0..1, steering wheel [rad], gear |
+| sender_time_s sim_time_s | clocks of the sender and of its simulation [s] |
+| preview | what was told ahead: t ax ay az p q r for each instant, / between, t from this packet |
+| settings | JSON, in the first row and wherever it changed: machine, head, tunables, rates |
 
 NAME runs over all installed algorithms, so that the columns stay the same when engines come and
 go. Pose and legs are computed from the accepted plan and the guard's clock; forces are those of the
-newest planner period and at most two periods old.
+newest planner period and at most two periods old. From ``t`` on these are the columns of a
+recording: `motionserver evaluate`, `tune` and `replay` read the file as it is.
 """
 
 from __future__ import annotations
@@ -36,7 +47,14 @@ from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.errors import MotionServerError
 
 FORCE: Final = ("x_m_s2", "y_m_s2", "z_m_s2")
+CUE: Final = (
+    *("t", "ax", "ay", "az", "p", "q", "r", "v", "roll", "pitch", "mode"),
+    *("throttle", "brake", "clutch", "steering", "gear", "sender_time_s", "sim_time_s", "preview"),
+)
+"""Columns of what the simulator said."""
+SETTINGS: Final = "settings"
 _WORDS: Final = ("state", "algorithm")
+_OTHERS: Final = (*CUE, SETTINGS)
 
 
 class RecordError(MotionServerError):
@@ -68,11 +86,12 @@ def columns(engines: Sequence[str]) -> list[str]:
     legs = [f"leg_{number}_m" for number in range(1, 7)]
     forces = [f"{of}_{axis}" for of in ("wanted", "felt") for axis in FORCE]
     sides = [f"{name}_{what}" for name in engines for what in (*FORCE, "kappa")]
-    return ["time_s", "state", *pose, *legs, *forces, "algorithm", "kappa", *sides]
+    platform = ["time_s", "state", *pose, *legs, *forces, "algorithm", "kappa", *sides]
+    return [*platform, *_OTHERS]
 
 
 def read_recorded(path: Path) -> Recorded:
-    """Read a recording; a last line that was cut off is left out.
+    """Read what the platform did; a last line that was cut off is left out.
 
     Raises:
         RecordError: It cannot be read, or is no recording.
@@ -85,14 +104,17 @@ def read_recorded(path: Path) -> Recorded:
     names = [name.removesuffix("_kappa") for name in header if name.endswith("_kappa")]
     if header != columns(names):
         raise RecordError(f"{path}: not written by `motionserver record` of this version")
-    if rows and len(rows[-1]) != len(header):
-        rows.pop()
+    cut = rows.pop()[:1] if rows and len(rows[-1]) != len(header) else []
+    state = header.index("state")
+    rows = [row for row in rows if len(row) <= state or row[state]]
     try:
+        # what was cut off began as a row at least
+        [float(text) for text in cut if text]
         table = {name: [row[i] for row in rows] for i, name in enumerate(header)}
         numbers = {
             name: np.array([float(text) if text else np.nan for text in column])
             for name, column in table.items()
-            if name not in _WORDS
+            if name not in _WORDS and name not in _OTHERS
         }
     except (IndexError, ValueError) as error:
         raise RecordError(f"{path}: a row does not fit the header ({error})") from error

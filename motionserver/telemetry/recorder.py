@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Any, Final, TextIO
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import Machine
 from motionserver.core.plan import Plan, unpack
+from motionserver.telemetry.cue_clock import CueClock
+from motionserver.telemetry.cue_history import CueReader
+from motionserver.telemetry.cue_rows import cue_row
 from motionserver.telemetry.link import STATES, GuardClock, Maps
-from motionserver.telemetry.recorded import RecordError, columns
+from motionserver.telemetry.recorded import CUE, RecordError, columns
 from motionserver.telemetry.trace import Trace
 
 POLL: Final = 0.004
@@ -35,16 +38,29 @@ class Recorder:
         maps: Mapped files of the run directory.
         machine: For the legs.
         engines: Names of all algorithms, for the columns.
+        cues: What the simulator says; None for a recording without it.
+        settings: What does not change while a server runs, kept beside the tunables.
     """
 
-    def __init__(self, maps: Maps, machine: Machine, engines: Sequence[str]) -> None:
+    def __init__(
+        self,
+        maps: Maps,
+        machine: Machine,
+        engines: Sequence[str],
+        cues: CueReader | None = None,
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
         self._maps, self._machine, self._engines = maps, machine, tuple(engines)
+        self._cues, self._clock = cues, CueClock(() if cues is None else cues.kept)
+        self._settings, self._told_settings = settings, ""
+        self._platform_columns = len(columns(engines)) - len(CUE) - 1
         self._plans: dict[int, Plan] = {}
         self._seen = self._seen_plan = -1
         self._sent_ns = 0
         self._began_ns: int | None = None
         self.heard_ns = 0
         self.rows = 0
+        self.cue_rows = 0
 
     def look(self) -> str | None:
         """Look once.
@@ -74,8 +90,44 @@ class Recorder:
                 STATES[clock.state],
                 *self._posture(clock),
                 *self._forces(clock.written_ns),
+                *[""] * len(CUE),
+                _quoted(self._new_settings()),
             )
         )
+
+    def heard(self, is_last: bool = False) -> list[str]:
+        """Rows of the simulator's packets that were not seen before.
+
+        Args:
+            is_last: True to give out those as well whose time is not known well yet.
+        """
+        if self._cues is None:
+            return []
+        timed = self._clock.timed(self._cues.new())
+        timed += self._clock.flush() if is_last else []
+        began = self._began_ns
+        rows = [cue_row((t - began) * 1e-9, cue) for t, cue in timed if began and t >= began]
+        self.cue_rows += len(rows)
+        return [",".join([""] * self._platform_columns + row + [""]) for row in rows]
+
+    @property
+    def missed(self) -> int:
+        """Packets of the simulator that came too fast to be read."""
+        return 0 if self._cues is None else self._cues.missed
+
+    def _new_settings(self) -> str:
+        """What is in force, if it is not what was told last; empty if it is."""
+        if self._settings is None:
+            return ""
+        message = self._maps.planner.read()
+        if message is None:
+            return ""
+        tuning = json.loads(message[1]).get("tuning", {}).get("values")
+        text = json.dumps({**self._settings, "tuning": tuning}, separators=(",", ":"))
+        if text == self._told_settings:
+            return ""
+        self._told_settings = text
+        return text
 
     def _take_plan(self) -> None:
         message = self._maps.accepted.read()
@@ -129,6 +181,11 @@ class Recorder:
         return [*forces, trace.algorithm, _share(trace.kappa), *map(_share, sides)]
 
 
+def _quoted(text: str) -> str:
+    """One field, whatever is in it."""
+    return '"' + text.replace('"', '""') + '"' if text else ""
+
+
 def _share(value: float | None) -> str:
     return "" if value is None else f"{value:.5g}"
 
@@ -161,6 +218,7 @@ def write_recording(
     if out.is_file():
         raise RecordError(f"--out {out}: there already. Give the name of a new file.")
     begun = now_ns()
+    why = "told to end"
     try:
         with out.open("w", encoding="utf-8", newline="") as stream:
             _line(stream, ",".join(columns(engines)))
@@ -170,19 +228,24 @@ def write_recording(
                 now = now_ns()
                 if row is not None:
                     _line(stream, row)
-                elif now - max(recorder.heard_ns, begun) > SILENT_NS:
-                    return "the server ended"
+                for cue in recorder.heard():
+                    _line(stream, cue)
+                if row is None and now - max(recorder.heard_ns, begun) > SILENT_NS:
+                    why = "the server ended"
+                    break
                 if now - flushed > _FLUSH_NS:
                     flushed = now
                     stream.flush()
                 if row is None:
                     pause(POLL)
+            for cue in recorder.heard(is_last=True):
+                _line(stream, cue)
     except OSError as error:
         raise RecordError(
             f"--out {out}: {error.strerror or error} after {recorder.rows} rows; the motion goes "
             "on. Free the disk or give another file, then record again."
         ) from error
-    return "told to end"
+    return why
 
 
 def _line(stream: TextIO, text: str) -> None:

@@ -58,7 +58,8 @@ def files(draw):
 
     lines = [line([head(name) for name in order])]
     if row_of_units:
-        lines.append(line([f"[{unit[n][0]}]" if n in unit else "-" for n in order]))
+        named = [f"[{unit[n][0]}]" if n in unit else "-" for n in order]
+        lines.append(line([n.replace(" ", "") if separator == " " else n for n in named]))
     for row in rows:
         values = dict(zip(COLUMNS, row, strict=True))
         lines.append(line([cell(name, values.get(name)) for name in order]))

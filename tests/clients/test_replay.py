@@ -199,3 +199,36 @@ def test_nobody_listening_does_not_stop_the_replay(drive):
 def test_argument_out_of_range_is_refused(drive, options):
     with pytest.raises(ValueError, match=r"allowed|choose|leave"):
         replay(drive, **options)
+
+
+def test_what_the_server_recorded_is_sent_on_as_it_was_told(tmp_path):
+    header = (
+        "time_s,state,t,ax,ay,az,p,q,r,v,roll,pitch,mode,throttle,brake,clutch,steering,gear,"
+        "sender_time_s,sim_time_s,preview\n"
+    )
+    rows = [
+        "0.0,RUN" + "," * 19,
+        ",,0.00,1,2,3,0.1,0.2,0.3,5,0.01,0.02,drive,0.5,0.25,0,-1.5,3,7.5,7.4,"
+        "0.1 1 2 3 0.1 0.2 0.3 / 0.3 4 5 6 0.4 0.5 0.6",
+        ",,0.01,1,2,3,0.1,0.2,0.3,5,0.01,0.02,pause,,,,,,7.51,7.41,",
+        ",,0.02,1,2,3,0.1,0.2,0.3,5,0.01,0.02,teleport,,,,,,7.52,7.42,",
+        ",,0.03,1,2,3,0.1,0.2,0.3,5,0.01,0.02,bye,,,,,,7.53,7.43,",
+        "0.05,RUN" + "," * 19,
+    ]
+    path = tmp_path / "drive.csv"
+    path.write_text(header + "\n".join(rows) + "\n")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as server:
+        server.bind(("127.0.0.1", 0))
+        server.settimeout(10.0)
+        replay(path, "127.0.0.1", server.getsockname()[1])
+        cues = [decode_cue(server.recv(2048)) for _ in range(5)]
+    assert [cue.mode.name for cue in cues] == ["DRIVE", "PAUSE", "TELEPORT", "PAUSE", "BYE"]
+    first = cues[0]
+    assert first.motion.acceleration == pytest.approx((1.0, 2.0, 3.0))
+    assert first.motion.attitude == pytest.approx((0.01, 0.02))
+    told = first.driver
+    assert (told.throttle, told.brake, told.steering, told.gear) == (0.5, 0.25, -1.5, 3)
+    assert (first.preview.start, first.preview.dt) == pytest.approx((0.1, 0.2))
+    assert first.preview.samples[1] == pytest.approx((4, 5, 6, 0.4, 0.5, 0.6))
+    assert cues[1].preview is None
+    assert cues[1].driver is None

@@ -88,10 +88,10 @@ def test_a_broken_result_is_driven_again(written, folder, capsys):
 def test_one_failure_does_not_take_the_others(folder, tmp_path, monkeypatch):
     real = run.drive_task
 
-    def breaks(task, gain):
+    def breaks(task):
         if task.contender.name == "classical":
             raise ArithmeticError("no root")
-        return real(task, gain)
+        return real(task)
 
     monkeypatch.setattr(run, "drive_task", breaks)
     single = tmp_path / "one"

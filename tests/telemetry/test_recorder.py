@@ -6,11 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from machines import compact
+from motion_clients import read_recording
 
 from motionserver.core.axes import frozen
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.plan import Plan, pack, rest_at
 from motionserver.core.safety.states import State
+from motionserver.core.state import VehicleMotion
+from motionserver.telemetry.blackbox.history import History
+from motionserver.telemetry.cue_history import CUE_BYTES, CUES, CueNotes, CueReader
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.recorded import RecordError, columns, read_recorded
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
@@ -145,6 +149,52 @@ def test_what_is_written_is_read_again(scene: Scene, tmp_path: Path) -> None:
     # a line that was cut off by a full disk or a power cut is left out
     out.write_text(out.read_text()[:-30])
     assert len(read_recorded(out).numbers["time_s"]) == 299
+
+
+def test_what_the_simulator_said_stands_beside_it_with_all_settings(tmp_path: Path) -> None:
+    folder = tmp_path / "blackbox"
+    folder.mkdir()
+    History.create(folder / f"{CUES}.history", CUE_BYTES, 64).close()
+    scene = Scene(tmp_path)
+    scene.recorder = Recorder(scene.maps, compact(), NAMES, CueReader(folder), {"head": 1})
+    notes = CueNotes(folder)
+    force = frozen([1.0, 2.0, 12.81])
+    motions = [
+        VehicleMotion(k * 10 * MS, 7, k, k * 10 * MS, force, frozen(np.zeros(3)), 5.0)
+        for k in range(1, 101)
+    ]
+    scene.packet(100, 0, 0.0)
+    notes.note(motions[:50])
+    out = tmp_path / "drive.csv"
+    now = 100
+
+    def pause(_: float) -> None:
+        nonlocal now
+        now += 17
+        if now == 117:
+            notes.note(motions[50:])
+        algorithm = "mpc" if now < 300 else "classical"
+        tuning = {"tuning": {"values": {"algorithm": algorithm, "scale": 0.6}}}
+        scene.maps.planner.write(json.dumps(tuning).encode())
+        scene.packet(now, 0, 0.0)
+
+    write_recording(
+        scene.recorder, NAMES, out, now_ns=lambda: now * MS, pause=pause, is_over=lambda: now > 1000
+    )
+    read = read_recording(out)
+    # those before the first row of the platform are left out, and no later one
+    assert [round(s.time, 6) for s in read.samples] == [
+        pytest.approx(0.01 * k, abs=1e-6) for k in range(91)
+    ]
+    assert read.samples[3].acceleration == pytest.approx((1.0, 2.0, 3.0))
+    assert [json.loads(text) for _, text in read.settings] == [
+        {"head": 1, "tuning": {"algorithm": name, "scale": 0.6}} for name in ("mpc", "classical")
+    ]
+    assert [at for at, _ in read.settings] == pytest.approx([0.017, 0.204])
+    assert read.states == ((0.0, "RUN"),)
+    assert scene.recorder.cue_rows == 91
+    # the reader of the platform's columns takes the rows of the platform alone
+    assert len(read_recorded(out).numbers["time_s"]) == scene.recorder.rows
 
 
 def test_a_full_disk_is_said(scene: Scene) -> None:

@@ -20,6 +20,7 @@ from motionserver.evaluate.compare.run import Result, run_tasks
 from motionserver.evaluate.compare.table import COLUMNS, Block, blocks, to_text
 from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.options import EvaluateOptions
+from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.tune.preset import read_fold_tunings
 from motionserver.evaluate.yardstick import RULE
 
@@ -69,7 +70,13 @@ def compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
     def tell(text: str) -> None:
         print(f"compare: {text}", file=sys.stderr, flush=True)  # noqa: T201
 
-    results = run_tasks(tasks, out / "drives", options.jobs, tell)
+    durations = {}
+    for path in recordings:
+        drive = read_recording(path)
+        durations[path] = drive.duration
+        for warning in drive.warnings:
+            tell(f"{path.stem}: warning: {warning}")
+    results = run_tasks(tasks, out / "drives", options.jobs, tell, durations)
     known = [result for result in results if result is not None]
     failed = [
         f"{task.recording.stem}: {task.contender.label}"

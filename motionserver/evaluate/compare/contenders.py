@@ -8,12 +8,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+import motion_clients
 import numpy as np
 
 import motionserver
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.disturbance import Disturbance
+from motionserver.evaluate.progress import Share
 
 RIVALS: Final = ("yardstick", "hindsight", "no motion")
 """Always in the table."""
@@ -35,6 +37,7 @@ _OF_ALGORITHMS: Final = (
     "solvers/",
 )
 """Files a rival does not depend on; values of the tuning stand in its key themselves."""
+_READERS: Final = ("csv_", "drive_samples", "recording", "units")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,8 @@ class Task:
         machine: The platform.
         rate: Rate of judging [Hz].
         planner_hz: Planner rate [Hz].
+        gain: For hindsight the yardstick's on the same recording; searched if None.
+        share: Called with the share done; None in a process of its own.
     """
 
     recording: Path
@@ -84,6 +89,13 @@ class Task:
     machine: Machine
     rate: float
     planner_hz: float
+    gain: float | None = None
+    share: Share | None = None
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return f"{self.recording.stem}: {self.contender.label}"
 
     def key(self) -> str:
         """Hash of everything its result depends on, the server's own code included."""
@@ -157,6 +169,10 @@ def _code(rival: bool) -> str:
             if rival and name.startswith(_OF_ALGORITHMS):
                 continue
             digest.update(name.encode())
+            digest.update(path.read_bytes())
+    # who reads the file decides what it says
+    for path in sorted(Path(motion_clients.__file__).parent.glob("*.py")):
+        if path.stem.startswith(_READERS):
             digest.update(path.read_bytes())
     return digest.hexdigest()
 

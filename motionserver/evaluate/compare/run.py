@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
@@ -19,25 +19,35 @@ from motionserver.evaluate.drive import Drive, no_motion
 from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import drive
 from motionserver.evaluate.metrics.figures import figures_of
+from motionserver.evaluate.progress import WEIGHTS, Progress
 from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.worker_pool import worker_pool
 from motionserver.evaluate.yardstick import find_yardstick, yardstick_of
 
 CURVE_HZ: Final = 20.0
 """Rate of the curves that are kept for the page [Hz]."""
+_LOOK: Final = 2.0
+"""Between two looks at other processes [s]."""
 Result = dict[str, Any]
 """Figures of one task as plain numbers, see `drive_task`."""
 Told = Callable[[str], None]
 
 
-def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Result | None]:
+def run_tasks(
+    tasks: list[Task],
+    folder: Path,
+    jobs: int,
+    tell: Told,
+    durations: dict[Path, float] | None = None,
+) -> list[Result | None]:
     """Results in the order of the tasks.
 
     Args:
         tasks: What to drive.
         folder: Keeps every result by the hash of what it depends on; begun runs go on.
         jobs: Processes at the same time.
-        tell: Called with a line of progress.
+        tell: Called with a line for every drive.
+        durations: Of the recordings [s], to tell the time that is left; alike if not known.
 
     Returns:
         One result per task; None where it raised, which is told.
@@ -47,20 +57,25 @@ def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Re
     results: list[Result | None] = [_kept(file) for file in files]
     missing = [index for index, result in enumerate(results) if result is None]
     tell(f"{len(tasks)} drives, {len(tasks) - len(missing)} of them known already")
-    done = 0
+    sizes = [_size(task) * (durations or {}).get(task.recording, 60.0) for task in tasks]
+    progress = Progress("compare", sum(sizes[index] for index in missing))
+    done, finished = 0, 0.0
 
     def take(index: int, result: Result | None, error: str) -> None:
-        nonlocal done
+        nonlocal done, finished
         done += 1
+        finished += sizes[index]
         task = tasks[index]
         name = f"{task.recording.stem}: {task.contender.label}"
         results[index] = result
+        progress.close()
         if result is None:
             tell(f"{done}/{len(missing)} {name}: FAILED: {error}")
-            return
-        nrmse = result["figures"]["nrmse_xy"]
-        shown = "-" if nrmse is None else f"{nrmse:.3f}"
-        tell(f"{done}/{len(missing)} {name}: nRMSE {shown} in {result['seconds']:.0f} s")
+        else:
+            nrmse = result["figures"]["nrmse_xy"]
+            shown = "-" if nrmse is None else f"{nrmse:.3f}"
+            tell(f"{done}/{len(missing)} {name}: nRMSE {shown} in {result['seconds']:.0f} s")
+        progress.at(finished)
 
     # the searches take longest: first, so that no core waits for them in the end
     order = sorted(missing, key=lambda index: tasks[index].contender.way != "")
@@ -68,7 +83,10 @@ def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Re
     if jobs <= 1 or len(missing) < 2:
         while order:
             index = gains.next_of(order)
-            take(index, *_guarded(tasks[index], files[index], gains.of(index)))
+            share = progress.part(finished, sizes[index], tasks[index].name)
+            task = replace(tasks[index], gain=gains.of(index), share=share)
+            take(index, *_guarded(task, files[index]))
+        progress.close()
         return results
     count = min(jobs, len(missing))
     with worker_pool(count) as pool:
@@ -76,11 +94,21 @@ def run_tasks(tasks: list[Task], folder: Path, jobs: int, tell: Told) -> list[Re
         while order or running:
             while order and len(running) < count:
                 index = gains.next_of(order)
-                future = pool.submit(_guarded, tasks[index], files[index], gains.of(index))
+                task = replace(tasks[index], gain=gains.of(index))
+                future = pool.submit(_guarded, task, files[index])
                 running[future] = index
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
+            progress.at(finished, ", ".join(tasks[index].name for index in running.values()))
+            for future in wait(running, _LOOK, return_when=FIRST_COMPLETED).done:
                 take(running.pop(future), *future.result())
+    progress.close()
     return results
+
+
+def _size(task: Task) -> float:
+    """How long a second of a drive takes, beside the others, about."""
+    if not task.contender.way:
+        return {"no motion": 0.02, "yardstick": 10.0, "hindsight": 5.0}[task.contender.name]
+    return WEIGHTS.get(task.contender.name, 1.0)
 
 
 class _Gains:
@@ -111,12 +139,8 @@ class _Gains:
         return waiting.pop(0)
 
 
-def drive_task(task: Task, gain: float | None = None) -> Result:
+def drive_task(task: Task) -> Result:
     """Drive and judge one task.
-
-    Args:
-        task: Who drives what.
-        gain: For hindsight the yardstick's on the same recording; searched if None.
 
     Returns:
         ``figures`` (as of `figures_of`), ``note`` (how a rival was found), ``gain`` of the
@@ -126,18 +150,27 @@ def drive_task(task: Task, gain: float | None = None) -> Result:
     begun = perf_counter()
     recording, machine, contender = read_recording(task.recording), task.machine, task.contender
     rate, planner_hz, tuning = task.rate, task.planner_hz, contender.tuning
+    gain, share = task.gain, task.share
     note = ""
     if contender.name == "no motion":
         driven = no_motion(machine, recording, tuning.scale, rate)
     elif contender.name == "yardstick":
-        found = find_yardstick(machine, recording, tuning, rate=rate, planner_hz=planner_hz)
+        found = find_yardstick(
+            machine, recording, tuning, rate=rate, planner_hz=planner_hz, progress=share
+        )
         driven, note, gain = found.drive, f"gain {found.gain:g}", found.gain
     elif contender.name == "hindsight":
         known = None
         if gain is not None:
             known = yardstick_of(machine, recording, tuning, gain, rate=rate, planner_hz=planner_hz)
         best = find_hindsight(
-            machine, recording, tuning, rate=rate, planner_hz=planner_hz, yardstick=known
+            machine,
+            recording,
+            tuning,
+            rate=rate,
+            planner_hz=planner_hz,
+            yardstick=known,
+            progress=share,
         )
         driven, note = best.drive, best.described()
     else:
@@ -149,6 +182,7 @@ def drive_task(task: Task, gain: float | None = None) -> Result:
             planner_hz=planner_hz,
             preview=contender.preview,
             disturbance=contender.disturbance,
+            progress=share,
         )
     return {
         "recording": recording.name,
@@ -162,9 +196,9 @@ def drive_task(task: Task, gain: float | None = None) -> Result:
     }
 
 
-def _guarded(task: Task, file: Path, gain: float | None) -> tuple[Result | None, str]:
+def _guarded(task: Task, file: Path) -> tuple[Result | None, str]:
     try:
-        result = drive_task(task, gain)
+        result = drive_task(task)
     except Exception as error:
         # one drive that fails must not take hours of others with it
         return None, f"{type(error).__name__}: {error}"

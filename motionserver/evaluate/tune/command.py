@@ -12,7 +12,7 @@ from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.ranges import PLANNER_RATES_HZ, check_algorithms
-from motionserver.evaluate.recording import Recording, read_recording
+from motionserver.evaluate.recording import Recording, read_all
 from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.criterion import SICKNESS_WEIGHT, Criterion
 from motionserver.evaluate.tune.driving import Progress
@@ -89,7 +89,7 @@ def tune(
     machine = machine if head is None else machine.with_head(np.array(head))
     _check(algorithm, trials, refine, seed, excerpt, planner_hz, scale, jobs)
     folder = make_folder("--out", out)
-    drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
+    drives = read_all(recordings)
     stretches = stretches_of(drives, excerpt)
     base = apply_changes(
         default_for(machine),

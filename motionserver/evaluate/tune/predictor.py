@@ -17,7 +17,8 @@ from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
 from motionserver.evaluate.fit_predictor import fit
 from motionserver.evaluate.html import document
-from motionserver.evaluate.recording import Recording, read_recording
+from motionserver.evaluate.recording import Recording, read_all
+from motionserver.evaluate.tune.driving import Progress
 from motionserver.evaluate.tune.page import table_html
 from motionserver.evaluate.tune.report import aligned
 from motionserver.evaluate.tune.tables import Table
@@ -27,7 +28,11 @@ _AXES: Final = ("surge", "sway")
 
 
 def tune_predictor(
-    recordings: Sequence[str | Path | Recording], name: str, out: str | Path
+    recordings: Sequence[str | Path | Recording],
+    name: str,
+    out: str | Path,
+    *,
+    progress: Progress | None = None,
 ) -> Predictor:
     """Fit a predictor to recordings and write down how it does on drives it has not seen.
 
@@ -38,6 +43,7 @@ def tune_predictor(
         recordings: Files, or drives already read, of one kind of vehicle.
         name: Of the predictor: lower-case letters, digits, hyphens.
         out: Folder, made if missing.
+        progress: Called with what is being done, recordings condensed, recordings in all.
 
     Returns:
         The predictor.
@@ -51,12 +57,12 @@ def tune_predictor(
             "--predictor", f"{name!r} is no name", "Give lower-case letters, digits, hyphens."
         )
     folder = make_folder("--out", out)
-    drives = [r if isinstance(r, Recording) else read_recording(r) for r in recordings]
+    drives = read_all(recordings)
     words = ["motionserver", "tune", "--predictor", name]
     words += [f"{r.name}.csv" if isinstance(r, Recording) else str(r) for r in recordings]
     command = shlex.join([*words, "--out", str(out)])
     try:
-        predictor = fit(drives, name, f"made by: {command}")
+        predictor = fit(drives, name, f"made by: {command}", progress)
     except ValueError as error:
         raise ConfigError("RECORDINGS", str(error), "Give longer or other drives.") from error
     save(predictor, folder / f"{name}.json")
