@@ -16,7 +16,6 @@ from motionserver.core.limits import machine_from_mapping
 from motionserver.cueing.registry import algorithms
 from motionserver.errors import ConfigError
 from motionserver.settings.config import load_config, run_dir_of
-from motionserver.telemetry.blackbox.room import FOLDER
 from motionserver.telemetry.cue_history import CueReader
 from motionserver.telemetry.link import GuardClock, Maps
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
@@ -57,7 +56,7 @@ def record(path: Path | None, out: Path, seconds: float | None) -> str:
         maps,
         machine_from_mapping(shown["machine"]),
         names,
-        CueReader(run_dir / FOLDER),
+        CueReader(run_dir),
         settings_of(shown),
     )
     begun = time.monotonic()

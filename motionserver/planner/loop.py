@@ -34,7 +34,6 @@ from motionserver.planner.tuner import Tuner
 from motionserver.planner.wake import next_wake
 from motionserver.planner.wake_ahead import MARGIN_NS, WakeAhead
 from motionserver.telemetry.blackbox.planner_box import PlannerBox
-from motionserver.telemetry.blackbox.room import FOLDER
 from motionserver.telemetry.cue_history import CueNotes
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
@@ -82,7 +81,7 @@ class PlannerLoop:
         self._timing = Timing(int(options.period * SECOND))
         self._view = PlannerView()
         self._box = PlannerBox(run_dir)
-        self._cues = CueNotes(run_dir / FOLDER)
+        self._cues = CueNotes(run_dir)
         self._seldom = Seldom(log)
         # a guard of short ticks needs some of them for its verdict
         tick = options.send_period / ticks_per_send(1.0 / options.send_period)

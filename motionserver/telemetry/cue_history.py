@@ -15,12 +15,10 @@ import numpy as np
 
 from motionserver.core.axes import frozen
 from motionserver.core.state import DriveMode, Driver, Preview, VehicleMotion
-from motionserver.telemetry.blackbox.history import open_history
+from motionserver.telemetry.blackbox.history import History, open_history
 
-CUES: Final = "cues"
-"""Name of the history in the folder of the black box."""
-CUES_KEPT: Final = 1024
-"""Four seconds of the fastest sender."""
+_FILE: Final = "cues.map"
+_KEPT: Final = 1024  # four seconds of the fastest sender
 MOST_AHEAD: Final = 80
 """Instants of a preview that are kept, twice what a packet can carry."""
 _FIXED: Final = struct.Struct("<QQqqQB7d?2d?4dbB")
@@ -106,15 +104,24 @@ def _driver(values: tuple[Any, ...]) -> Driver:
     return Driver(throttle, brake, clutch, steering, gear)
 
 
+def make_cue_history(run_dir: Path) -> None:
+    """Make an empty one.
+
+    Raises:
+        OSError: There is no room, or the folder cannot be written.
+    """
+    History.create(run_dir / _FILE, CUE_BYTES, _KEPT).close()
+
+
 class CueNotes:
     """Notes the vehicle's believed packets; without a history it does nothing.
 
     Args:
-        folder: Where the history lies.
+        run_dir: Where the processes meet.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._history = open_history(folder / f"{CUES}.history")
+    def __init__(self, run_dir: Path) -> None:
+        self._history = open_history(run_dir / _FILE)
         self.unreadable = 0
 
     def note(self, believed: Iterable[VehicleMotion]) -> None:
@@ -136,11 +143,11 @@ class CueReader:
         kept: Packets that were there already when it was opened.
 
     Args:
-        folder: Where the history lies.
+        run_dir: Where the processes meet.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._history = open_history(folder / f"{CUES}.history")
+    def __init__(self, run_dir: Path) -> None:
+        self._history = open_history(run_dir / _FILE)
         self._seen = 0
         self.missed = 0
         self.kept = self.new()

@@ -13,6 +13,7 @@ from motionserver.core.safety.states import State
 from motionserver.core.safety.verdict import Reason
 from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
+from motionserver.telemetry.cue_history import make_cue_history
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.trace import TRACE_BYTES
 
@@ -109,6 +110,8 @@ class Maps:
         service: Supervisor to page: processes as JSON.
         page: Page to supervisor: empty messages, as a sign of life.
         trace: Planner to a recorder: `trace.Trace`, every period.
+
+    Where they are made, so is the history of believed packets, see `cue_history`.
     """
 
     def __init__(self, run_dir: Path, create: bool = False) -> None:
@@ -126,3 +129,5 @@ class Maps:
         self.service = opened("service", 8192)
         self.page = opened("page", 0)
         self.trace = opened("trace", TRACE_BYTES)
+        if create:
+            make_cue_history(run_dir)

@@ -14,7 +14,6 @@ from motionserver.telemetry.blackbox.history import History
 from motionserver.telemetry.cue_clock import CueClock
 from motionserver.telemetry.cue_history import (
     CUE_BYTES,
-    CUES,
     MOST_AHEAD,
     CueNotes,
     CueReader,
@@ -106,7 +105,7 @@ def heard(at_ms, sent_ms, session=1, sequence=0, **more):
 
 
 def test_reader_gets_each_packet_once_and_counts_those_it_missed(tmp_path: Path):
-    History.create(tmp_path / f"{CUES}.history", CUE_BYTES, 8).close()
+    History.create(tmp_path / "cues.map", CUE_BYTES, 8).close()
     notes = CueNotes(tmp_path)
     notes.note([heard(1, 1)])
     reader = CueReader(tmp_path)
@@ -120,7 +119,7 @@ def test_reader_gets_each_packet_once_and_counts_those_it_missed(tmp_path: Path)
 
 
 def test_a_long_preview_is_cut_and_a_strange_field_costs_its_packet_only(tmp_path: Path):
-    History.create(tmp_path / f"{CUES}.history", CUE_BYTES, 8).close()
+    History.create(tmp_path / "cues.map", CUE_BYTES, 8).close()
     notes, reader = CueNotes(tmp_path), CueReader(tmp_path)
     table = frozen(np.zeros((200, 3)))
     long = Preview(frozen(np.arange(200.0)), table, table)
@@ -129,7 +128,7 @@ def test_a_long_preview_is_cut_and_a_strange_field_costs_its_packet_only(tmp_pat
     assert len(first.preview.times) == MOST_AHEAD
     assert last.arrival_ns == 3 * MS
     assert notes.unreadable == 1
-    # without the folder of the black box nothing is noted, and nothing fails
+    # without a history nothing is noted, and nothing fails
     CueNotes(tmp_path / "none").note([heard(1, 1)])
     assert CueReader(tmp_path / "none").new() == []
 

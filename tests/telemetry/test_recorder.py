@@ -13,8 +13,7 @@ from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.plan import Plan, pack, rest_at
 from motionserver.core.safety.states import State
 from motionserver.core.state import VehicleMotion
-from motionserver.telemetry.blackbox.history import History
-from motionserver.telemetry.cue_history import CUE_BYTES, CUES, CueNotes, CueReader
+from motionserver.telemetry.cue_history import CueNotes, CueReader
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.recorded import RecordError, columns, read_recorded
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
@@ -152,12 +151,9 @@ def test_what_is_written_is_read_again(scene: Scene, tmp_path: Path) -> None:
 
 
 def test_what_the_simulator_said_stands_beside_it_with_all_settings(tmp_path: Path) -> None:
-    folder = tmp_path / "blackbox"
-    folder.mkdir()
-    History.create(folder / f"{CUES}.history", CUE_BYTES, 64).close()
     scene = Scene(tmp_path)
-    scene.recorder = Recorder(scene.maps, compact(), NAMES, CueReader(folder), {"head": 1})
-    notes = CueNotes(folder)
+    scene.recorder = Recorder(scene.maps, compact(), NAMES, CueReader(tmp_path), {"head": 1})
+    notes = CueNotes(tmp_path)
     force = frozen([1.0, 2.0, 12.81])
     motions = [
         VehicleMotion(k * 10 * MS, 7, k, k * 10 * MS, force, frozen(np.zeros(3)), 5.0)

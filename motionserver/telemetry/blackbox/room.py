@@ -12,7 +12,6 @@ from typing import Final
 
 from motionserver.telemetry.blackbox.history import History
 from motionserver.telemetry.blackbox.records import GUARD, KEPT, PACKET
-from motionserver.telemetry.cue_history import CUE_BYTES, CUES, CUES_KEPT
 from motionserver.telemetry.link import PLAN_BYTES
 
 FOLDER: Final = "blackbox"
@@ -55,7 +54,6 @@ def make_room(run_dir: Path, rate_hz: float, plan_hz: float) -> None:
             ("accepted", PLAN_BYTES, _PLANS),
             ("proposed", PLAN_BYTES, _PLANS),
             ("packets", PACKET.size, ceil(KEPT * PACKETS_PER_SECOND)),
-            (CUES, CUE_BYTES, CUES_KEPT),
             ("periods", PERIOD_BYTES, periods),
             ("planner_events", EVENT_BYTES, _EVENTS),
         ):
