@@ -41,8 +41,9 @@ def run_predictions(recording: Path, options: EvaluateOptions) -> int:
 
     drive = read_recording(recording)
     tuning = options.for_drive(drive.live)[2]
-    # without pedals the model that needs them would be another one's double
-    models = [name for name in MODELS if name != "vehicle" or drive.drivers is not None]
+    # without pedals or a file the model that needs them would be another one's double
+    missing = {"vehicle": drive.drivers is None, "learned": not tuning.predictor}
+    models = [name for name in MODELS if not missing.get(name)]
     progress = Progress(drive.name, 1.0)
     for warning in drive.warnings:
         progress.line(f"warning: {warning}")

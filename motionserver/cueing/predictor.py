@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Final
 
@@ -63,17 +60,14 @@ def save(predictor: Predictor, path: Path) -> None:
     path.write_text(text + "\n", "utf-8")
 
 
-def load(path: Path | Traversable) -> Predictor:
+def load(path: Path) -> Predictor:
     """Read a predictor.
 
     Raises:
         PredictorError: The file cannot be read or holds no predictor.
     """
     try:
-        if isinstance(path, Path):
-            data = json.loads(read_bounded_text(path, LARGEST_FILE))
-        else:  # of the package itself
-            data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(read_bounded_text(path, LARGEST_FILE))
         if data["format"] != FORMAT:
             raise PredictorError(f"{path}: format {data['format']!r}; this reads {FORMAT!r}")
         horizons = frozen(data["horizons_s"])
@@ -109,26 +103,15 @@ def check(predictor: Predictor, where: str) -> None:
         raise PredictorError(f"{where}: a weight is no number or beyond {LARGEST_WEIGHT:g}")
 
 
-def predictor_names() -> tuple[str, ...]:
-    """Predictors that come with the package."""
-    folder = files("motionserver.presets").joinpath("predictors")
-    return tuple(
-        sorted(p.name.removesuffix(".json") for p in folder.iterdir() if p.name.endswith(".json"))
-    )
-
-
-@lru_cache(maxsize=8)
-def named(name: str) -> Predictor:
-    """The predictor of that name which comes with the package.
+def chosen(path: str) -> Predictor:
+    """The predictor that a tuning names.
 
     Raises:
-        PredictorError: There is none.
+        PredictorError: None is named, or the file is none.
     """
-    if name not in predictor_names():
-        raise PredictorError(
-            f"predictor {name!r} does not exist; allowed: {', '.join(predictor_names())}"
-        )
-    return load(files("motionserver.presets").joinpath("predictors").joinpath(f"{name}.json"))
+    if not path:
+        raise PredictorError("the reference model 'learned' needs a predictor, and none is named")
+    return load(Path(path))
 
 
 def _rows(matrix: Array) -> list[list[float]]:

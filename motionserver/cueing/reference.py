@@ -15,7 +15,7 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.core.state import Driver, Stimulus
-from motionserver.cueing.predictor import PredictorError, named, predictor_names
+from motionserver.cueing.predictor import PredictorError, chosen
 from motionserver.cueing.preview import PreviewKeeper
 from motionserver.cueing.reference_ar import Autoregressive
 from motionserver.cueing.reference_base import AxisModel
@@ -38,7 +38,7 @@ _MAKERS: Final[dict[str, Callable[[float, Array, str], AxisModel]]] = {
     "fade": lambda period, instants, predictor: Fade(instants),
     "ar": lambda period, instants, predictor: Autoregressive(period, instants),
     "vehicle": lambda period, instants, predictor: Vehicle(period, instants),
-    "learned": lambda period, instants, predictor: Learned(period, instants, named(predictor)),
+    "learned": lambda period, instants, predictor: Learned(period, instants, chosen(predictor)),
 }
 MODELS: Final = tuple(_MAKERS)
 
@@ -87,14 +87,14 @@ class Reference:
         period: Time between two stimuli [s].
         times: Instants after the hand-over that are asked for, (K,) [s].
         lead: From the newest stimulus to the hand-over [s].
-        predictor: Which fitted predictor "learned" uses, see `predictor.predictor_names`.
+        predictor: File of the fitted predictor that "learned" uses.
 
     Raises:
         ValueError: The model or the predictor does not exist.
     """
 
     def __init__(
-        self, model: str, period: float, times: Array, lead: float, predictor: str = "truck"
+        self, model: str, period: float, times: Array, lead: float, predictor: str = ""
     ) -> None:
         if model not in _MAKERS:
             raise TunableError(
@@ -106,8 +106,8 @@ class Reference:
         try:
             self._axes = _MAKERS[model](period, instants, predictor)
         except PredictorError as error:
-            names = ", ".join(predictor_names())
-            raise TunableError("predictor", str(error), f"one of {names}") from error
+            allowed = "a file that 'motionserver tune --predictor NAME' wrote, with its whole path"
+            raise TunableError("predictor", str(error), allowed) from error
         self._preview = PreviewKeeper(period, instants)
 
     def predict(self, stimulus: Stimulus, turning: Array | None = None) -> Array:

@@ -40,7 +40,7 @@ class Tuning:
         legs: Leg-length rows in the MPC; False is the paper's box-only form.
         halving: "off", "paper" (equations 7 and 8 as printed) or "sound".
         backend: QP solver, see `solvers.registry.BACKENDS`.
-        predictor: Which fitted predictor the reference "learned" uses.
+        predictor: File of the fitted predictor that the reference "learned" uses; "" for none.
         mpc_weight_heave: Weight of the vertical force error, horizontal is 1.
         mpc_weight_rates: Weight of the body-rate error, per (rad/s)2.
         mpc_weight_position: Weight of being away from neutral, surge and sway, per m2.
@@ -72,7 +72,7 @@ class Tuning:
     legs: bool = True
     halving: str = "sound"
     backend: str = "daqp"
-    predictor: str = "truck"
+    predictor: str = ""
     mpc_weight_heave: float = 0.3
     mpc_weight_rates: float = 5.0
     mpc_weight_position: float = 0.1

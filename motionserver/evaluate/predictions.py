@@ -24,6 +24,8 @@ from motionserver.evaluate.recording import Recording, from_samples
 
 HORIZONS: Final = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 """How far ahead the figures are told [s]."""
+UNFITTED: Final = tuple(name for name in MODELS if name != "learned")
+"""Models that need no file of one's own."""
 PERIOD: Final = 0.01
 """Planner period of the comparison [s]."""
 WINDOW: Final = 0.2
@@ -56,9 +58,9 @@ class PredictionErrors:
 
 def predictions(
     recording: Recording,
-    models: Sequence[str] = MODELS,
+    models: Sequence[str] = UNFITTED,
     *,
-    predictor: str = "truck",
+    predictor: str = "",
     scale: float = 1.0,
     drivers: Sequence[Driver | None] | None = None,
     horizons: Sequence[float] = HORIZONS,
@@ -69,7 +71,7 @@ def predictions(
     Args:
         recording: The drive.
         models: Names of reference models; "vehicle" without ``drivers`` is "ar".
-        predictor: Of the model "learned".
+        predictor: File of the model "learned".
         scale: Share of the motion that is wanted; the figures hardly depend on it.
         drivers: What the driver did, one for each sample of the recording.
         horizons: How far ahead [s].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Final, get_args
 
 from pydantic import Field
 from pydantic.config import JsonDict
@@ -14,6 +14,9 @@ from motionserver.errors import MotionServerError
 
 Range = tuple[float, float]
 """Least and largest value."""
+
+LONGEST_PATH: Final = 1024
+"""Characters of a path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,12 @@ def choice(default: object, *, group: str, label: str, meaning: str) -> Any:  # 
     return Field(default, description=meaning, json_schema_extra=extra)
 
 
+def file(default: str, *, group: str, label: str, meaning: str) -> Any:  # noqa: ANN401  (as above)
+    """Declare the path of a file, which may be empty."""
+    extra: JsonDict = {"unit": "", "group": group, "label": label, "more": "", "is_file": True}
+    return Field(default, description=meaning, json_schema_extra=extra)
+
+
 def shown(value: object) -> object:
     """A hostile value as JSON may carry it back: finite, short, harmless."""
     if value is None or isinstance(value, bool):
@@ -111,9 +120,11 @@ def bounds(item: FieldInfo, limit: Range | None) -> tuple[float, float, tuple[ob
     """Least and largest value of a number (0, 0 for a word), and the choices of a word.
 
     Args:
-        item: Declared by `number` or `choice`.
+        item: Declared by `number`, `choice` or `file`.
         limit: Range that the machine gives, if it has a say.
     """
+    if _is_file(item):
+        return 0.0, 0.0, ()
     if item.annotation is str:
         return 0.0, 0.0, algorithms()
     if item.annotation is bool:
@@ -127,6 +138,8 @@ def bounds(item: FieldInfo, limit: Range | None) -> tuple[float, float, tuple[ob
 
 def allowed_range(item: FieldInfo, limit: Range | None) -> str:
     """What a tunable may be, in words."""
+    if _is_file(item):
+        return f"path of a file, at most {LONGEST_PATH} characters, or nothing"
     low, high, choices = bounds(item, limit)
     if choices:
         return " or ".join(str(c).lower() if isinstance(c, bool) else str(c) for c in choices)
@@ -151,9 +164,15 @@ def described(
     limited: dict[str, object] = (
         {"choices": list(choices)} if choices else {"min": low, "max": high}
     )
+    if _is_file(item):
+        limited = {}
     plain = {"unit": "", "group": users[0] if users else "", "label": name, "more": ""}
     about = {"name": name, "default": item.default, "meaning": item.description or ""}
     return about | plain | _extra(item) | {"algorithms": list(users)} | limited
+
+
+def _is_file(item: FieldInfo) -> bool:
+    return bool(_extra(item).get("is_file"))
 
 
 def _extra(item: FieldInfo) -> dict[str, Any]:

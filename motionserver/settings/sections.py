@@ -186,7 +186,7 @@ class CueingSection(Strict):
   tilt_rate_deg_s = 3.0       how fast the cabin may tilt
   reference = "ar"            what surge and sway are expected to do: "constant", "fade", "ar",
                               "vehicle" (needs pedals and steering), "learned"
-  predictor = "truck"         what "learned" was fitted to: "truck" or "car"
+  predictor = "/path/my.json" what "learned" uses: written by `motionserver tune --predictor my`
   mpc_trust_s = 1.0           how far ahead that is trusted; a preview is trusted to its end
   perception = "none"         or "telban-cardullo", "reid-nahon": weigh errors as the inner ear
   backend = "daqp"            or "piqp", "osqp" (inexact), "hpipm" (extra motionserver[hpipm])

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from motionserver.cueing.tuning import Tuning
-from motionserver.settings.fields import algorithms, choice, number
+from motionserver.settings.fields import LONGEST_PATH, algorithms, choice, file, number
 
 
 def _known(name: str) -> str:
@@ -143,9 +143,10 @@ class TuningFields(BaseModel):
         _START.backend, group="Optimiser", label="Solver",
         meaning="Which solver computes the quadratic programme.",
     )
-    predictor: Literal["truck", "car"] = choice(
+    predictor: Annotated[str, Field(max_length=LONGEST_PATH)] = file(
         _START.predictor, group="Optimiser", label="Predictor",
-        meaning="Kind of vehicle whose drives the reference model learned was fitted to.",
+        meaning="File that 'motionserver tune --predictor' wrote from your own drives, with its "
+        "whole path: what the reference model learned corrects its forecast by.",
     )
     mpc_weight_heave: float = _six(
         _START.mpc_weight_heave, 10.0, "Heave weight",

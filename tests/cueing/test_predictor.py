@@ -10,12 +10,11 @@ from motionserver.cueing.predictor import (
     Predictor,
     PredictorError,
     load,
-    named,
-    predictor_names,
     save,
 )
 from motionserver.cueing.reference import Reference
 from motionserver.cueing.reference_learned import Learned
+from motionserver.errors import TunableError
 
 INSTANTS = np.array([0.05, 0.25, 0.5, 1.0, 2.0, 3.0])
 
@@ -35,15 +34,6 @@ def drive(model, scale=1.0, mirror=1.0, count=300, seed=1):
         one = Stimulus(wanted[:3], wanted[3:], share=scale, speed=12.0)
         out = model.predict(one, one.rates)
     return out
-
-
-def test_both_that_come_along_are_readable_and_say_where_they_are_from():
-    assert predictor_names() == ("car", "truck")
-    for name, count in (("truck", 5), ("car", 1)):
-        provenance = named(name).provenance
-        assert len(provenance["recordings"]) == count
-        assert provenance["note"]
-        assert provenance["left_out"]
 
 
 def test_half_the_scale_is_half_the_forecast():
@@ -94,5 +84,17 @@ def test_a_file_that_is_no_predictor(tmp_path, change, complaint):
 def test_files_that_are_not_there(tmp_path):
     with pytest.raises(PredictorError, match="cannot be read"):
         load(tmp_path / "nothing.json")
-    with pytest.raises(ValueError, match="allowed: car, truck"):
-        Reference("learned", 0.01, INSTANTS, 0.0, "bicycle")
+    # none comes with the package: one fitted to other drives holds on nobody's own
+    for named, complaint in (("", "needs a predictor"), ("truck", "cannot be read")):
+        with pytest.raises(TunableError, match=complaint) as refused:
+            Reference("learned", 0.01, INSTANTS, 0.0, named)
+        assert refused.value.tunable == "predictor"
+        assert "motionserver tune --predictor" in refused.value.allowed
+
+
+def test_reference_takes_the_file_that_is_named(tmp_path):
+    save(some(), tmp_path / "p.json")
+    by_file = drive(Reference("learned", 0.01, INSTANTS, 0.0, str(tmp_path / "p.json")))
+    assert by_file[:, :2] == pytest.approx(
+        drive(Learned(0.01, INSTANTS, load(tmp_path / "p.json")))[:, :2]
+    )

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from motionserver.core.state import Driver, Preview, Stimulus
+from motionserver.cueing.predictor import FEATURES, Predictor, save
 from motionserver.cueing.reference import MODELS, Reference, believable
 from motionserver.cueing.reference_base import HEAVE_FADE, RATE_FADE
 
@@ -93,9 +94,18 @@ def test_unknown_model():
         Reference("oracle", 0.01, TIMES, 0.0)
 
 
+@pytest.fixture(scope="module")
+def predictor(tmp_path_factory):
+    """A file for the model "learned"."""
+    path = tmp_path_factory.mktemp("predictor") / "drawn.json"
+    weights = 0.05 * np.random.default_rng(0).normal(size=(2, 3, FEATURES))
+    save(Predictor("drawn", np.array([0.25, 1.0, 2.0]), weights, {"note": "drawn"}), path)
+    return str(path)
+
+
 @pytest.mark.parametrize("name", MODELS)
-def test_every_model_begins_at_now_and_fades_heave_and_roll(name):
-    model = Reference(name, 0.01, np.append(1e-6, TIMES), 0.0)
+def test_every_model_begins_at_now_and_fades_heave_and_roll(name, predictor):
+    model = Reference(name, 0.01, np.append(1e-6, TIMES), 0.0, predictor)
     for _ in range(50):
         out = model.predict(Stimulus(np.array([1.0, -2.0, 3.0]), np.full(3, 0.1), speed=10.0))
     assert out[0] == pytest.approx([1.0, -2.0, 3.0, 0.1, 0.1, 0.1], abs=0.02)
@@ -105,14 +115,20 @@ def test_every_model_begins_at_now_and_fades_heave_and_roll(name):
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.integers(0, 10_000), st.sampled_from(MODELS), st.sampled_from([0.0, 0.03, 0.6, 1.0]))
-def test_jumps_and_nonsense_leave_every_model_finite_and_bounded(seed, name, share):
+@given(
+    seed=st.integers(0, 10_000),
+    name=st.sampled_from(MODELS),
+    share=st.sampled_from([0.0, 0.03, 0.6, 1.0]),
+)
+def test_jumps_and_nonsense_leave_every_model_finite_and_bounded(predictor, seed, name, share):
     rng = np.random.default_rng(seed)
-    model = Reference(name, 0.01, TIMES, 0.01)
+    model = Reference(name, 0.01, TIMES, 0.01, predictor)
     for k in range(300):
         wild = rng.choice([0.0, 1.0, 1e6, np.nan, -np.inf], p=[0.3, 0.6, 0.04, 0.03, 0.03])
+        with np.errstate(invalid="ignore"):  # nothing times infinity is no number either
+            force = 5.0 * share * rng.normal(size=3) * (wild if k % 50 == 0 else 1.0)
         said = Stimulus(
-            5.0 * share * rng.normal(size=3) * (wild if k % 50 == 0 else 1.0),
+            force,
             share * rng.normal(size=3),
             share=share,
             speed=30.0 * rng.normal() * wild,

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
-from motion_clients.recording import recording_path
 
-from motionserver.cueing.predictor import check, load, named, save
+from motionserver.cueing.predictor import check, load, save
 from motionserver.cueing.reference import Reference
 from motionserver.evaluate.fit_predictor import FIT_HORIZONS, fit
 from motionserver.evaluate.predictions import errors_of, forecast_errors
-from motionserver.evaluate.recording import from_samples, read_recording
+from motionserver.evaluate.recording import from_samples
 
 AHEAD = np.array([0.5, 1.0])
 TIMES = np.arange(0.0, 30.0, 0.01)
@@ -82,13 +81,3 @@ def test_what_cannot_be_fitted_to():
         fit([], "none")
     with pytest.raises(ValueError, match="too short"):
         fit([pulses(0).excerpt(0.0, 9.0), pulses(1)], "short")
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", ["truck", "car"])
-def test_the_shipped_ones_come_out_of_the_shipped_recordings(name):
-    shipped = named(name)
-    drives = [read_recording(recording_path(each)) for each in shipped.provenance["recordings"]]
-    again = fit(drives, name, shipped.provenance["note"])
-    assert again.weights == pytest.approx(shipped.weights, abs=1e-4)
-    assert again.provenance["ridge"] == shipped.provenance["ridge"]

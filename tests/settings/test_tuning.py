@@ -11,12 +11,14 @@ from motionserver.core.axes import frozen
 from motionserver.core.limits import Machine, Pace
 from motionserver.cueing.tuning import Tuning
 from motionserver.settings.fields import TuningError
+from motionserver.settings.machine import load_machine
 from motionserver.settings.tuning import (
     TuningModel,
     apply_changes,
     default_for,
     describe,
 )
+from motionserver.settings.tuning_proof import make_with
 
 
 def machine(box=(0.198, 0.22, 0.2, 0.3054, 0.2844, 0.3054)):
@@ -105,7 +107,7 @@ def test_description_is_complete_and_stays_within_the_machine():
     for entry in entries.values():
         assert entry["meaning"].endswith(".")
         assert entry["group"]
-        assert "choices" in entry or entry["more"]
+        assert "choices" in entry or entry["more"] or entry["is_file"]
 
 
 def test_built_in_presets_are_valid():
@@ -116,3 +118,19 @@ def test_built_in_presets_are_valid():
         data = tomllib.loads(folder.joinpath(name).read_text())
         assert data["about"]
         apply_changes(TuningModel(), data["values"])
+
+
+def test_predictor_is_the_path_of_a_file_of_bounded_length():
+    assert apply_changes(TuningModel(), {"predictor": "/a/my.json"}).predictor == "/a/my.json"
+    for wrong in (7, "x" * 2000):
+        with pytest.raises(TuningError) as caught:
+            apply_changes(TuningModel(), {"predictor": wrong})
+        assert caught.value.errors[0].field == "predictor"
+        assert "path of a file" in caught.value.errors[0].allowed
+
+
+def test_learned_is_refused_by_name_until_there_is_a_file():
+    model = apply_changes(TuningModel(), {"reference": "learned"})
+    with pytest.raises(TuningError) as caught:
+        make_with(load_machine("t2-compact"), 0.01, model)
+    assert [error.field for error in caught.value.errors] == ["predictor"]

@@ -33,7 +33,6 @@ _SOURCES: Final = (
     "evaluate/tune/outcome.py",
     "evaluate/tune/sickness.py",
     "evaluate/tune/stretches.py",
-    "presets/predictors/*.json",
 )
 """What turns a recording into figures, and not what draws them."""
 _LIBRARIES: Final = ("numpy", "scipy", "daqp", "osqp", "piqp", "casadi")

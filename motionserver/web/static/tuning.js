@@ -5,6 +5,7 @@ import { byId, make, put } from "./dom.js";
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser", "Six axes"];
 const LASTING = 6; // looks, ten a second
 const AGAIN = 30; // looks until the form is asked for again
+const isNumber = (field) => !field.choices && !field.is_file;
 const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
@@ -55,17 +56,20 @@ export class Tuning {
         option.value = String(word);
         input.append(option);
       }
+    } else if (field.is_file) {
+      input.type = "text";
+      input.maxLength = 1024;
     } else {
       input.type = "number";
       input.step = "any";
       input.inputMode = "decimal";
     }
     const help = make("p", "help", `${field.meaning} `);
-    if (!field.choices) help.append(make("span", "range", `${field.min} to ${field.max} ${unit(field)}`.trim()));
+    if (isNumber(field)) help.append(make("span", "range", `${field.min} to ${field.max} ${unit(field)}`.trim()));
     const wrong = make("p", "wrong-text");
     wrong.hidden = true;
     box.append(name, input);
-    if (!field.choices) box.append(make("span", "unit", unit(field)));
+    if (isNumber(field)) box.append(make("span", "unit", unit(field)));
     box.append(help, wrong);
     input.addEventListener("input", () => { this.mark(field.name, ""); this.refresh(); });
     this.rows.set(field.name, { field, box, input, wrong });
@@ -73,6 +77,7 @@ export class Tuning {
   }
 
   read(row) {
+    if (row.field.is_file) return row.input.value.trim();
     if (!row.field.choices) return row.input.value.trim() === "" ? null : Number(row.input.value);
     return row.field.choices.find((word) => String(word) === row.input.value);
   }
