@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -78,11 +79,16 @@ def check(
     json_out: Annotated[
         Path | None, typer.Option("--json", help="write all its figures", metavar="OUT")
     ] = None,
+    no_drive: Annotated[
+        bool, typer.Option("--no-drive", help="do not drive it off-line for some seconds")
+    ] = False,
 ) -> None:
-    """Validate a configuration, show what it means and what its machine reaches."""
+    """Validate a configuration, drive its machine off-line, show what it reaches."""
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")  # as in the planner, or its times would be others
     from motionserver.cli.workspace import check_text
 
-    typer.echo(check_text(config, platform, html_out, svg_out, json_out))
+    typer.echo(check_text(config, platform, html_out, svg_out, json_out, not no_drive))
 
 
 @app.command()

@@ -24,6 +24,9 @@ from motionserver.settings.machine import (
     read_machine,
 )
 from motionserver.settings.resolve import resolve
+from motionserver.settings.usable import doubts
+from motionserver.supervisor.addresses import try_way
+from motionserver.supervisor.rundir import refuse_foreign
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.recorder import SILENT_NS
@@ -50,7 +53,8 @@ def serve(path: Path, dry_run: bool) -> int:
     if config.web.enabled:
         scheme = "https" if config.web.tls_cert else "http"
         log.info("page %s://%s:%d", scheme, config.web.host, config.web.port)
-    if warning := box_warning(read_machine(config.platform.preset)):
+    read = read_machine(config.platform.preset)
+    for warning in filter(None, (box_warning(read), *doubts(config, read.machine))):
         log.warning("%s", warning)
     if dry_run:
         log.info("dry run: everything is played, nothing that moves is sent")
@@ -70,7 +74,9 @@ def make_service(config: Config, run_dir: Path, dry_run: bool) -> Service:
 def _check_page(config: Config, resolved: dict[str, Any]) -> None:
     """Say here what the page would refuse at every start, while nothing moves yet."""
     if config.web.enabled:
-        config_from(resolved["web"]).check()
+        page = config_from(resolved["web"])
+        page.check()
+        page.check_certificate()
 
 
 def describe(path: Path) -> str:
@@ -78,6 +84,8 @@ def describe(path: Path) -> str:
     config = load_config(path)
     resolved = resolve(config, run_dir_of(config))
     _check_page(config, resolved)
+    refuse_foreign(run_dir_of(config))
+    try_way(resolved["platform"]["host"], resolved["platform"]["port"])
     machine = machine_from_mapping(resolved["machine"])
     platform, planner = resolved["platform"], resolved["planner"]
     stroke = (machine.leg_max - machine.leg_min) * 1e3
@@ -97,6 +105,7 @@ def describe(path: Path) -> str:
         "before the packet",
     ]
     lines += box_lines(read_machine(config.platform.preset))
+    lines += wrapped([f"warning    {doubt}" for doubt in doubts(config, machine)])
     if planner["side_engines"]:
         lines.append(f"beside     {', '.join(planner['side_engines'])}")
     lines += [f"source     {s['kind']} on {s['host']}:{s['port']}" for s in resolved["sources"]]
@@ -116,7 +125,12 @@ def box_lines(read: MachineAsRead) -> list[str]:
         said.append(f"box        no [table2] in the file; computed: {toml}")
     if warning := box_warning(read):
         said.append(f"warning    {warning}")
-    return [line for text in said for line in wrap(text, 80, subsequent_indent=" " * 11)]
+    return wrapped(said)
+
+
+def wrapped(lines: list[str]) -> list[str]:
+    """Lines that fit a terminal; what is longer goes on below its first word."""
+    return [part for line in lines for part in wrap(line, 80, subsequent_indent=" " * 11)]
 
 
 def ask_guard(op: str, path: Path | None) -> dict[str, Any]:

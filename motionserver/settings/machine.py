@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
@@ -59,7 +60,7 @@ def read_machine(name: str) -> MachineAsRead:
     Raises:
         ConfigError: As `load_machine`.
     """
-    path = Path(name)
+    path = Path(os.path.expanduser(name))
     if name.endswith(".toml"):
         try:
             text = read_bounded_text(path, SETTINGS_BYTES)

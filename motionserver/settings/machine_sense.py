@@ -33,6 +33,12 @@ _BOX_TIMES: Final = 20.0
 """Times what the machine reaches from which on a box is a slip, and no wish."""
 
 
+def farthest_head(platform_joints: Array) -> float:
+    """How far from the reference point a driver's head may be [m]."""
+    seen = platform_joints[:, :2] - platform_joints[:, :2].mean(0)
+    return _HEAD[0] + _HEAD[1] * float(np.hypot(*seen.T).mean())
+
+
 def complaints(data: MachineFile, reach: Array | None = None) -> Iterator[Complaint]:
     """Everything that is wrong, the most telling first; each relies on those before.
 
@@ -102,7 +108,7 @@ def _sizes(data: MachineFile) -> Iterator[Complaint]:
             f"{radii[small]:.3g} m: allowed is {_RADII:g} times",
             "Give all coordinates in m.",
         )
-    far, most = float(np.linalg.norm(data.head)), _HEAD[0] + _HEAD[1] * radii["platform_joints"]
+    far, most = float(np.linalg.norm(data.head)), farthest_head(np.array(data.platform_joints))
     if far > most:
         yield Complaint(
             ("head",),

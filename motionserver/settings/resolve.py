@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 from dataclasses import asdict
 from math import ceil
 from pathlib import Path
@@ -15,6 +14,7 @@ from motionserver.cueing.registry import algorithms
 from motionserver.errors import ConfigError
 from motionserver.platforms.base import PlatformOptions
 from motionserver.platforms.registry import make_platform
+from motionserver.settings.address_rules import ip_of
 from motionserver.settings.config import Config, SourceSection, split_address, state_dir_of
 from motionserver.settings.fields import TuningError
 from motionserver.settings.key_file import read_key
@@ -23,6 +23,7 @@ from motionserver.settings.side_engines import side_names
 from motionserver.settings.tuning import BOX_FIELDS, apply_changes, default_for
 from motionserver.settings.tuning_proof import make_with
 from motionserver.settings.tuning_scope import check_effect
+from motionserver.settings.usable import check_usable
 
 
 def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, Any]:
@@ -43,6 +44,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
     machine = load_machine(platform.preset)
     if platform.head_m is not None:
         machine = machine.with_head(frozen(platform.head_m))
+    check_usable(config, machine, run_dir)
     offset = platform.length_offset_m
     options = PlatformOptions(
         mode=platform.mode,
@@ -75,7 +77,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         "unchecked": unchecked_limits(machine),
         "engage": config.operator.engage,
         "dry_run": dry_run,
-        "enable_input": config.operator.enable_input,
+        "enable_input": _whole(config.operator.enable_input),
         "realtime": config.server.realtime,
         "blackbox": {
             "folder": str(state_dir_of(config) / "blackbox"),
@@ -84,7 +86,7 @@ def resolve(config: Config, run_dir: Path, dry_run: bool = False) -> dict[str, A
         "platform": {
             "format": platform.format,
             "options": asdict(options),
-            "host": str(_address(platform.host)),
+            "host": str(ip_of(platform.host)),
             "port": platform.port,
             "rate_hz": platform.rate_hz,
         },
@@ -133,15 +135,6 @@ def _check_tuning(
             ) from error
 
 
-def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
-    try:
-        return ipaddress.ip_address("127.0.0.1" if host == "localhost" else host)
-    except ValueError as error:
-        raise ConfigError(
-            "[platform] host", f"{host!r} is no IP address", "Give the platform's number."
-        ) from error
-
-
 def _source(source: SourceSection) -> dict[str, Any]:
     where = f"[[sources]] {source.kind} {source.listen}"
     host, port = split_address(source.listen)
@@ -183,13 +176,14 @@ def _source(source: SourceSection) -> dict[str, Any]:
     }
 
 
+def _whole(path: str) -> str:
+    """A path with the home folder for ~; "" stays that."""
+    return str(Path(path).expanduser()) if path else ""
+
+
 def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    ip = ip_of(host)
+    return ip is not None and ip.is_loopback
 
 
 def _web(config: Config, run_dir: Path, machine: dict[str, object]) -> dict[str, Any]:
@@ -197,7 +191,7 @@ def _web(config: Config, run_dir: Path, machine: dict[str, object]) -> dict[str,
     return {
         "host": web.host,
         "port": web.port,
-        "tokens_file": web.tokens_file or str(state_dir / "tokens.json"),
+        "tokens_file": _whole(web.tokens_file) or str(state_dir / "tokens.json"),
         "run_dir": str(run_dir),
         "audit_file": str(state_dir / "audit.jsonl"),
         "presets_dir": str(state_dir / "presets"),
@@ -205,6 +199,6 @@ def _web(config: Config, run_dir: Path, machine: dict[str, object]) -> dict[str,
         "allowed_hosts": web.allowed_hosts,
         "engage": "http" if config.operator.engage == "http" else "local",
         "enable_input": bool(config.operator.enable_input),
-        "tls_cert": web.tls_cert or None,
-        "tls_key": web.tls_key or None,
+        "tls_cert": _whole(web.tls_cert) or None,
+        "tls_key": _whole(web.tls_key) or None,
     }

@@ -44,6 +44,27 @@ def claim_platform(host: str, port: int) -> socket.socket:
     return claim
 
 
+def try_way(host: str, port: int) -> None:
+    """Ask the kernel whether single packets can be sent to the platform; nothing is sent.
+
+    Only the kernel knows which addresses are the broadcast addresses of this computer's networks.
+
+    Raises:
+        ConfigError: It is such an address.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with contextlib.suppress(OSError), socket.socket(family, socket.SOCK_DGRAM) as tried:
+        try:
+            tried.connect((host, port))
+        except PermissionError as error:
+            raise ConfigError(
+                "[platform] host",
+                f"{host} is the broadcast address of a network here: no single platform answers "
+                "to it",
+                "Give the platform's own IP address.",
+            ) from error
+
+
 def try_addresses(sources: list[dict[str, Any]], page: dict[str, Any] | None) -> None:
     """Bind everything the children will bind, all at once, and let go of it.
 

@@ -41,7 +41,7 @@ def take(run_dir: Path) -> TextIO:
         run_dir.mkdir(mode=0o700, parents=True, exist_ok=True)
         if run_dir.stat().st_uid != os.getuid():
             raise ConfigError(where, f"{run_dir} belongs to somebody else", other)
-        _refuse_foreign(run_dir)
+        refuse_foreign(run_dir)
         _mark(run_dir)
         run_dir.chmod(0o700)
         lock = (run_dir / "service.lock").open("w")
@@ -89,7 +89,12 @@ def foreign_content(run_dir: Path) -> list[str]:
     return [] if MARKER in names and _is_marker(run_dir / MARKER) else names
 
 
-def _refuse_foreign(run_dir: Path) -> None:
+def refuse_foreign(run_dir: Path) -> None:
+    """Refuse a folder that is somebody's.
+
+    Raises:
+        ConfigError: It holds something and has no marker of ours.
+    """
     if names := foreign_content(run_dir):
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
         raise ConfigError(

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
-from motionserver.supervisor.addresses import claim_platform, open_link, try_addresses
+from motionserver.supervisor.addresses import claim_platform, open_link, try_addresses, try_way
 from motionserver.supervisor.child import Child
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
 from motionserver.supervisor.rundir import clean, take
@@ -53,6 +53,7 @@ class Service:
         with contextlib.ExitStack() as undo:
             self._lock = undo.enter_context(take(run_dir))
             peer = resolved["platform"]["host"], resolved["platform"]["port"]
+            try_way(*peer)
             self._claim = undo.enter_context(claim_platform(*peer))
             self._link = undo.enter_context(open_link(local))
             try_addresses(resolved["sources"], resolved["web"] if config_web else None)

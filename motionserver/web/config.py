@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import json
+import ssl
 import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -117,6 +118,24 @@ class WebConfig:
                 f"tls_key and an existing tokens file ({self.tokens_file}). Start once on "
                 "127.0.0.1 to make the tokens, name a certificate and key, or stay on 127.0.0.1"
             )
+
+    def check_certificate(self) -> None:
+        """Refuse a certificate and key that cannot be served, before the page's process tries.
+
+        Raises:
+            WebConfigError: They cannot be read, are no PEM, are encrypted, or do not belong
+                together.
+        """
+        if self.tls_cert is None:
+            return
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        try:
+            context.load_cert_chain(self.tls_cert, self.tls_key, password=lambda: "")
+        except (OSError, ValueError) as error:
+            raise WebConfigError(
+                f"tls_cert = {self.tls_cert}, tls_key = {self.tls_key}: not a certificate chain "
+                f"and its own unencrypted key, PEM ({getattr(error, 'reason', None) or error})"
+            ) from error
 
 
 def is_loopback(address: str) -> bool:
