@@ -36,19 +36,19 @@ def is_question(request):
 class World:
     """One server, with a clock of its own that it is told about."""
 
-    def __init__(self, folder, **more):
+    def __init__(self, folder, tokens=TOKENS, **more):
         self.time = 0.0
         self.scene = Scene(MACHINE)
         self.scene.book = TuningBook(MACHINE, self.now)
         self.asked = []
         self.silent = False
-        tokens = folder / "tokens.json"
-        tokens.write_text(json.dumps(TOKENS))
-        tokens.chmod(0o600)
+        file = folder / "tokens.json"
+        file.write_text(json.dumps(tokens))
+        file.chmod(0o600)
         values = {"host": "127.0.0.1", "engage": "http", **more}
         self.config = WebConfig(
             port=8080,
-            tokens_file=tokens,
+            tokens_file=file,
             run_dir=folder,
             audit_file=folder / "audit.jsonl",
             presets_dir=folder / "presets",

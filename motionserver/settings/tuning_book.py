@@ -213,7 +213,7 @@ class TuningBook:
 
     def _undo(self) -> dict[str, Any]:
         if not self._former:
-            return self._refused("invalid", "nothing to undo")
+            return self._refused("nothing", "nothing to undo")
         if self._too_fast():
             return self._refused("rate", f"more than {CHANGES_PER_SECOND} changes a second")
         wanted = self._former.pop().model

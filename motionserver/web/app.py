@@ -18,6 +18,7 @@ from motionserver.settings.tuning_presets import PresetShelf
 from motionserver.web.attempts import Attempts
 from motionserver.web.audit import Audit
 from motionserver.web.auth import Doorkeeper
+from motionserver.web.blackbox_routes import blackbox_routes
 from motionserver.web.config import WebConfig
 from motionserver.web.desk import Desk
 from motionserver.web.gate import Gate
@@ -90,6 +91,7 @@ def build_app(
     _motion_routes(app, desk)
     app.include_router(tuning_routes(desk))
     app.include_router(side_routes(desk))
+    app.include_router(blackbox_routes(desk))
     app.mount("/static", StaticFiles(directory=_STATIC), name="static")
     _error_answers(app)
     app.add_middleware(

@@ -39,6 +39,7 @@ class WebConfig:
         enable_input: True if an enable input is configured; the guard reads it at each engage.
         tls_cert: Certificate chain, PEM.
         tls_key: Its key, PEM.
+        blackbox_dir: Where the dumps of the black box lie; None without one.
     """
 
     host: str
@@ -53,6 +54,7 @@ class WebConfig:
     enable_input: bool = False
     tls_cert: Path | None = None
     tls_key: Path | None = None
+    blackbox_dir: Path | None = None
     _machine: list[Machine] = field(default_factory=list, repr=False, compare=False)
 
     @property
@@ -155,7 +157,8 @@ def config_from(data: Mapping[str, Any]) -> WebConfig:
         TypeError: A key is missing or unknown.
     """
     values = dict(data)
-    for name in ("tokens_file", "run_dir", "audit_file", "presets_dir", "tls_cert", "tls_key"):
+    for name in ("tokens_file", "run_dir", "audit_file", "presets_dir", "tls_cert", "tls_key",
+                 "blackbox_dir"):  # fmt: skip
         if values.get(name) is not None:
             values[name] = Path(values[name])
     values["allowed_hosts"] = tuple(values.get("allowed_hosts", ()))

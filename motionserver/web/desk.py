@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from fastapi import Request
+from starlette.requests import ClientDisconnect
 
 from motionserver.settings.tuning_presets import PresetShelf
 from motionserver.web.audit import Audit
@@ -77,6 +78,10 @@ async def read_json(request: Request, empty: dict[str, Any] | None = None) -> di
     try:
         async with asyncio.timeout(_PATIENCE):
             body = await _body(request)
+    except ClientDisconnect:
+        # nobody reads the answer; it is counted like any other
+        raise Refusal(400, "the client left before its body was complete", path,
+                      "as many bytes as announced", "send the whole body") from None  # fmt: skip
     except TimeoutError:
         raise Refusal(408, "the body did not arrive", path, f"within {_PATIENCE:g} s",
                       "send it at once", headers={"connection": "close"}) from None  # fmt: skip

@@ -19,7 +19,7 @@ MAX_BODY: Final = 64 * 1024
 MOST_AT_ONCE: Final = 64
 """Requests that are answered at a time, streams among them."""
 PARK: Final = "/api/park"
-"""Parking finds room beyond that, and is judged whatever guesses came before it."""
+"""Parking finds room beyond that, and takes a short token whatever guesses came before it."""
 _ROOM_TO_PARK: Final = 16
 _SECURITY: Final = {
     "content-security-policy": "default-src 'self'; base-uri 'none'; form-action 'none'; "

@@ -8,11 +8,12 @@ from typing import Any, Final, Protocol
 
 from motionserver.web.refusal import Refusal
 
-_STATUS: Final = {"stale": 412, "invalid": 422, "rate": 429}
+_STATUS: Final = {"stale": 412, "invalid": 422, "rate": 429, "nothing": 409}
 _DO: Final = {
     "stale": "read GET /api/tuning again and repeat with its ETag",
     "invalid": "correct the values named in details",
     "rate": "wait a second and repeat",
+    "nothing": "-",
 }
 _ALLOWED: Final = {
     "stale": 'If-Match with the version in force, "{version}"',

@@ -19,7 +19,7 @@ from motionserver.web.config import WebConfigError
 
 _HASHED: Final = "sha256:"
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
-_SHORTEST: Final = 32
+SHORTEST: Final = 32
 """Shortest token [characters]."""
 _LARGEST: Final = 4096
 """Largest tokens file that is read [B]."""
@@ -80,7 +80,7 @@ def load_tokens(path: Path) -> Tokens:
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         # without the cause: it may quote what the file says
         raise WebConfigError(
-            f"{path}: viewer, tuner and operator expected, each a token of at least {_SHORTEST} "
+            f"{path}: viewer, tuner and operator expected, each a token of at least {SHORTEST} "
             f"characters, or {_HASHED} and 64 hex digits"
         ) from error
     if len(set(hashes.values())) < len(Role):
@@ -101,6 +101,6 @@ def _hash_of(entry: str) -> bytes:
         if not _DIGEST.fullmatch(entry.removeprefix(_HASHED)):
             raise ValueError("not 64 hex digits")
         return bytes.fromhex(entry.removeprefix(_HASHED))
-    if len(entry) < _SHORTEST:
+    if len(entry) < SHORTEST:
         raise ValueError("too short")
     return hashlib.sha256(entry.encode()).digest()

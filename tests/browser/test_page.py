@@ -21,14 +21,14 @@ pytestmark = IN_CHROMIUM
 class Site:
     """A server process with a scene behind it."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, **config):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
         machine = t2_compact()
         self.url = f"http://127.0.0.1:{self.port}/"
         self.scene = Scene(machine)
-        self.configuration = write_configuration(folder, self.port, machine)
+        self.configuration = write_configuration(folder, self.port, machine, **config)
         self.process = None
 
     def start(self):

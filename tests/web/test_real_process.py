@@ -51,6 +51,23 @@ def test_what_is_no_request_is_answered_with_no(site, sent):
     assert site.status("GET", "/healthz") == 200
 
 
+def test_client_that_leaves_in_mid_body_leaves_no_traceback(site):
+    for announced in (b"Content-Length: 100", b"Transfer-Encoding: chunked"):
+        part = b"{" if b"Length" in announced else b"1\r\n{\r\n"
+        for method, path in ((b"PATCH", b"/api/tuning"), (b"POST", b"/api/side")):
+            with site.connect() as link:
+                link.sendall(
+                    method + b" " + path + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+                    b"Authorization: " + OPERATOR.encode() + b'\r\nIf-Match: "1"\r\n'
+                    b"Content-Type: application/json\r\n" + announced + b"\r\n\r\n" + part
+                )
+    assert site.status("GET", "/healthz") == 200
+    with site.ask("GET", "/metrics", authorization=OPERATOR) as answer:
+        answer.read()
+    assert "Traceback" not in site.written()
+    assert "ClientDisconnect" not in site.written()
+
+
 def test_an_upgrade_to_a_websocket_is_not_one(site):
     own = f"127.0.0.1:{site.port}".encode()
     line = first_line(site, BAD[-1].replace(b"http://evil.example", b"http://" + own).replace(

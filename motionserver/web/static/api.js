@@ -28,7 +28,10 @@ export async function send(method, path, { body, ifMatch } = {}) {
 }
 
 export function sentence(body) {
-  const parts = [body.error || "refused"];
-  if (body.do && body.do !== "-") parts.push(body.do);
-  return parts.join(": ");
+  const said = [body.error || "refused"];
+  const details = (body.details || []).map((item) => `${item.field} ${item.message}${item.allowed ? ` (allowed ${item.allowed})` : ""}`);
+  if (details.length) said.push(details.join("; "));
+  else if (body.allowed && body.allowed !== "-") said.push(`allowed is ${body.allowed}`);
+  if (body.do && body.do !== "-") said.push(body.do);
+  return said.join(": ");
 }

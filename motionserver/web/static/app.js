@@ -2,6 +2,7 @@
 import { send, sentence, setToken, token } from "./api.js";
 import { byId, put } from "./dom.js";
 import { Engines } from "./engines.js";
+import { FaultHelp } from "./faulthelp.js";
 import { Hexapod } from "./hexapod.js";
 import { Legs } from "./legs.js";
 import { duration, showLog, showNumbers, showState } from "./panels.js";
@@ -15,6 +16,7 @@ const legs = new Legs();
 const plots = new Plots();
 const tuning = new Tuning();
 const engines = new Engines();
+const faultHelp = new FaultHelp();
 engines.onDrive = (name) => tuning.driveWith(name);
 let status = null;
 let arrived = 0;
@@ -69,15 +71,25 @@ for (const op of ["engage", "park", "reset"]) {
 }
 
 async function identify() {
-  const answer = await send("GET", "/api/status");
+  let answer = await send("GET", "/api/status");
+  const isUnknown = answer.status === 401 && token() !== "";
+  if (isUnknown) {
+    // an unknown token must not take away what is shown without one
+    setToken("");
+    byId("token").placeholder = "access token";
+    stream.restart();
+    answer = await send("GET", "/api/status");
+  }
   caller = {
     role: answer.headers.get("x-motion-role") || "viewer",
     hasToken: answer.ok && answer.headers.get("x-motion-token") === "yes",
   };
   const wrong = answer.status === 401;
-  put(byId("answer"), caller.hasToken ? "" : "To engage, park or tune, enter a token above; the server made three in its tokens file.");
-  byId("role").className = `pill ${wrong ? "bad" : caller.hasToken ? "good" : ""}`;
-  put(byId("role"), wrong ? "unknown token" : caller.role);
+  const unknown = wrong ? "The token is not known here." : "The token is not known here; what is shown is open to everybody on this computer.";
+  put(byId("answer"), caller.hasToken ? "" : isUnknown ? `${unknown} The tokens are in the server's tokens file.` : "To engage, park or tune, enter a token above; the server made three in its tokens file.");
+  byId("role").className = `pill ${wrong || isUnknown ? "bad" : caller.hasToken ? "good" : ""}`;
+  byId("answer").classList.toggle("warn", isUnknown);
+  put(byId("role"), isUnknown ? "token unknown" : wrong ? "token needed" : caller.role);
   tuning.mayTune = caller.hasToken && caller.role !== "viewer";
   engines.mayTune = tuning.mayTune;
   engines.mayRun = caller.role === "operator";
@@ -98,6 +110,7 @@ function render() {
   freshness();
   if (!status || document.hidden) return;
   showState(status);
+  faultHelp.show(status);
   legs.show(status.guard);
   showNumbers(status);
   showLog(status);

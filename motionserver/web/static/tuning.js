@@ -155,7 +155,7 @@ export class Tuning {
         if (this.mark(item.field, `${item.message}; allowed ${item.allowed}`)) this.rows.get(item.field).box.parentNode.open = true;
       }
       const wrong = (answer.body.details || []).length;
-      this.say(wrong ? `Nothing was changed: ${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields.` : sentence(answer.body), true);
+      this.say(wrong ? `Nothing was changed: ${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields. ${sentence(answer.body)}` : sentence(answer.body), true);
       if (answer.status === 412) this.values = (await send("GET", "/api/tuning")).body.values || this.values;
       if (answer.status === 412 && answer.body.version) this.version = answer.body.version;
       this.refresh();
