@@ -16,7 +16,7 @@ from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
 from motionserver.planner.inputs import Inputs
 from motionserver.planner.sides import Sides
-from motionserver.planner.source_notices import notices_of
+from motionserver.planner.source_notices import notices_of, sensor_notices
 from motionserver.planner.spare_time import KEPT, expected_ns
 from motionserver.planner.tuner import Tuner
 from motionserver.telemetry.ticker import Lateness
@@ -146,6 +146,7 @@ class PlannerView:
         thought, gate = self._thought, inputs.vehicle
         age = gate.freshness.age_ns(now_ns)
         notices = [one.text for one in notices_of(inputs, now_ns)]
+        notices += sensor_notices(inputs, now_ns)
         is_paused = inputs.is_paused_by_silence(now_ns)
         proposal = None if thought is None else thought.proposal
         report = None if thought is None else thought.report

@@ -55,7 +55,22 @@ def notices_of(inputs: Inputs, now_ns: int) -> list[Notice]:
         found.append(Notice(Notices.VALUES, complaint))
     if gate.clock.complaint:
         found.append(Notice(Notices.SENDER_TIME, gate.clock.complaint))
+    previews = inputs.previews.gate
+    if not previews.is_silent(now_ns):
+        if complaint := previews.plausibility.complaint():
+            found.append(Notice(Notices.VALUES, f"preview: {complaint}"))
+        if previews.clock.complaint:
+            found.append(Notice(Notices.SENDER_TIME, f"preview: {previews.clock.complaint}"))
     return found
+
+
+def sensor_notices(inputs: Inputs, now_ns: int) -> list[str]:
+    """What is wrong with the packets of the platform's own sensor, for the operator."""
+    gate = inputs.sensor
+    if gate.is_silent(now_ns):
+        return []
+    found = (gate.plausibility.complaint(), gate.clock.complaint)
+    return [f"sensor: {text}" for text in found if text]
 
 
 def spoken(notices: Sequence[Notice]) -> str:

@@ -110,6 +110,7 @@ def driven(tmp_path: Path):
         yield rig, sender
         sender.ended = True
         sender.join(10.0)
+        sender.link.close()
         assert rig.end() == 0
         assert_soft(rig.verdict())
 
@@ -130,6 +131,7 @@ HELD = frozenset({"RUN", "HOLD"})
 
 
 @pytest.mark.campaign
+@pytest.mark.timeout(900)
 def test_a_foreign_sender_is_never_parked_for_its_clock(driven, capsys):
     rig, sender = driven
     # a busy machine may hold the sender or the server for a moment: HOLD may come, parking may not

@@ -187,6 +187,17 @@ def test_a_stamp_that_is_no_clock_is_named_and_costs_nothing(num, den, said, int
     assert next(k for k, text in enumerate(found) if text) * interval <= 3000
 
 
+def test_a_clock_that_is_given_up_in_the_midst_is_named_for_what_it_became():
+    listener = Listener()
+    found = set()
+    for k in range(900):
+        listener.hear(10 * k * MS, 0 if k > 350 else 10**15 + 10 * k * MS)
+        found.add(listener.clock.complaint)
+    assert len(found) == 2
+    assert "does not advance, it is 0" in max(found)
+    assert listener.late == []
+
+
 def test_garbage_is_named_and_costs_nothing():
     noise = random.Random(4)
     listener = Listener()

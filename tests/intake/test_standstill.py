@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from motion_clients.recording import read_recording, recording_path
 from motion_protocol import Cue, Flags, Motion, encode_cue
-from motions import motion
+from motions import motion, preview
 
 from motionserver.core.intake.gate import Gate
 from motionserver.core.intake.plausibility import Plausibility
@@ -55,6 +55,22 @@ def test_gravity_that_is_wrong_is_named_with_the_flag(values, flags, said, speed
 )
 def test_a_wrong_force_at_standstill_is_named(values, flags, said):
     assert said in native(values, flags)
+
+
+@pytest.mark.parametrize(
+    ("values", "flags", "said"),
+    [
+        ((0.0, 0.0, 9.81), NONE, "counted twice"),
+        ((0.0, 0.0, 0.0), Flags.GRAVITY_INCLUDED, "missing"),
+        ((5.0, 0.0, 9.81), Flags.GRAVITY_INCLUDED, ""),
+        ((0.0, 0.0, 14.0), Flags.GRAVITY_INCLUDED, ""),
+    ],
+)
+def test_of_a_steady_drive_only_gravity_is_judged(values, flags, said):
+    found = native(values, flags, speed=20.0, seconds=4.0)
+    assert bool(found) is bool(said)
+    assert said in found
+    assert native(values, flags, speed=20.0, seconds=2.9) == ""
 
 
 @pytest.mark.parametrize("size", [9.32, 9.81, 10.30])
@@ -156,6 +172,18 @@ def test_drives_as_they_are_give_no_cause(name):
 
 
 DEGREES = 180.0 / math.pi
+
+
+def previewed(apart):
+    checks = Plausibility()
+    for k in range(200):
+        checks.heard(motion(10.0 * k, k, x=1.0, preview=preview([0.05, 0.1], x=1.0 + apart)))
+    return checks.complaint()
+
+
+def test_a_preview_that_is_about_something_else_is_named():
+    assert previewed(0.0) == previewed(3.9) == ""
+    assert "4.1 m/s2 from the cue" in previewed(4.1)
 
 
 def change(name, apply):

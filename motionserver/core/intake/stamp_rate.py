@@ -79,7 +79,8 @@ class StampRate:
                 former.arrived + window.arrived,
                 former.advanced + window.advanced,
             )
-            self.complaint = "" if _is_good(both) else _words(both, self._newest)
+            # the newer one is all of one kind, even where the older one saw the clock change
+            self.complaint = "" if _is_good(both) else _words(window, self._newest)
 
 
 def _rate(window: _Window) -> float:
@@ -92,7 +93,7 @@ def _is_good(window: _Window) -> bool:
 
 def _words(window: _Window, stamp: int) -> str:
     if window.back >= MOST_BACK:
-        return f"the sender time went backwards {window.back} times in 2 s. {_REMEDY}"
+        return f"the sender time went backwards {window.back} times in a second. {_REMEDY}"
     if window.advanced == 0:
         return f"the sender time does not advance, it is {stamp} in every packet. {_REMEDY}"
     rate = _rate(window)

@@ -17,7 +17,9 @@ TOLERANCE: Final = 0.5
 DIRECTION: Final = 1.5
 """Deviation of the specific force from gravity in the told attitude at standstill [m/s2]."""
 STANDS_NS: Final = SECOND_NS
-"""How long it must have stood [ns]."""
+"""How long it must have stood, or moved unaccelerated at an unknown speed [ns]."""
+MOVES_NS: Final = 3 * SECOND_NS
+"""How long a vehicle that moves must have felt the same, without turning [ns]."""
 SLOW: Final = 0.1
 """Speed of a vehicle that stands [m/s]."""
 CALM: Final = 0.05
@@ -39,23 +41,26 @@ class StandstillForce:
         """Begin without a packet."""
         self.complaint = ""
         self._since: int | None = None
-        self._forces: deque[Array] = deque(maxlen=2 * STANDS_NS // _EVERY_NS)
+        self._forces: deque[Array] = deque(maxlen=2 * MOVES_NS // _EVERY_NS)
         self._noted_ns = 0
+        self._moves = False
 
     def heard(self, motion: VehicleMotion) -> None:
         """Note a packet."""
-        if not _may_stand(motion):
+        if motion.mode is not DriveMode.DRIVE or np.any(np.abs(motion.rates) > CALM):
             self._since = None
             return
         now = motion.arrival_ns
-        if self._since is None:
+        moves = motion.speed_known and abs(motion.speed) > SLOW
+        if self._since is None or moves is not self._moves:
             self._since = self._noted_ns = now
+            self._moves = moves
             self._forces.clear()
         elif now - self._noted_ns < _EVERY_NS:
             return
         self._noted_ns = now
         self._forces.append(motion.force)
-        if now - self._since < STANDS_NS or len(self._forces) < _FEWEST:
+        if now - self._since < (MOVES_NS if moves else STANDS_NS) or len(self._forces) < _FEWEST:
             return
         forces = np.array(self._forces)
         if np.any(np.ptp(forces, axis=0) > STEADY):
@@ -63,28 +68,24 @@ class StandstillForce:
             self._since = None
             return
         force = forces.mean(axis=0)
-        if motion.speed_known or _counts_gravity_wrong(force):
-            self.complaint = _judged(force, motion.attitude)
+        if (motion.speed_known and not moves) or _counts_gravity_wrong(force):
+            self.complaint = _judged(force, motion.attitude, moves)
         self._since = now
         self._forces.clear()
 
 
-def _may_stand(motion: VehicleMotion) -> bool:
-    slow = not motion.speed_known or abs(motion.speed) <= SLOW
-    return motion.mode is DriveMode.DRIVE and slow and bool(np.all(np.abs(motion.rates) <= CALM))
-
-
 def _counts_gravity_wrong(force: Array) -> bool:
-    """Without a speed only gravity that is missing or counted twice is told from a steady drive."""
+    """Unless it stands, only gravity that is missing or counted twice is told from a drive."""
     size = float(np.linalg.norm(force))
     return size < TOLERANCE or abs(size - 2.0 * GRAVITY) < TOLERANCE
 
 
-def _judged(force: Array, attitude: tuple[float, float] | None) -> str:
+def _judged(force: Array, attitude: tuple[float, float] | None, moves: bool) -> str:
     size = float(np.linalg.norm(force))
     if abs(size - GRAVITY) > TOLERANCE:
+        when = "in steady straight motion" if moves else "at standstill"
         return (
-            f"at standstill the specific force is {size:.2f} m/s2, it must be {GRAVITY} within "
+            f"{when} the specific force is {size:.2f} m/s2, it must be {GRAVITY} within "
             f"{TOLERANCE}: {_cause(size)}"
         )
     gravity = np.array([0.0, 0.0, GRAVITY])
