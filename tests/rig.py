@@ -289,6 +289,16 @@ class Rig:
         """All changes of state, of all guards, in order, from the log."""
         return [(a, b) for a, b in _ARROW.findall(self.text())]
 
+    def way(self) -> list[tuple[str, str]]:
+        """The changes of state without momentary holds: a busy machine may hold for a moment."""
+        way: list[tuple[str, str]] = []
+        for step in self.transitions():
+            if step == ("HOLD", "RUN") and way[-1:] == [("RUN", "HOLD")]:
+                way.pop()
+            else:
+                way.append(step)
+        return way
+
     def ask(self, op: str, **more: Any) -> dict[str, Any]:
         return ask(self.run_dir / "guard.sock", {"op": op, "by": "console", **more}, timeout=5.0)
 

@@ -168,7 +168,7 @@ def test_a_signed_client_is_answered_and_bye_parks(tmp_path: Path) -> None:
         stop.set()
         rig.wait_state("PARKED")
         thread.join(30.0)
-        assert ("RUN", "PARKING") in rig.transitions()
+        assert ("RUN", "PARKING") in rig.way()
         assert rig.end() == 0
         verdict = rig.verdict()
     assert_soft(verdict)

@@ -24,11 +24,11 @@ def test_page_and_planner_are_killed_in_motion(tmp_path: Path) -> None:
     with Rig(tmp_path, web=True) as rig:
         rig.run()
         rig.wait_for(lambda: rig.pid("web"), "the page")
-        before = rig.shown()["counters"]["entered_run"]
+        before = rig.way()
         replaced(rig, "web", kill(rig, "web"))
         rig.wait_plans(30)
-        assert rig.state == "RUN"
-        assert rig.shown()["counters"]["entered_run"] == before
+        rig.wait_state("RUN")
+        assert rig.way() == before
         kill_planner(rig)
         way = rig.transitions()
         assert ("RUN", "HOLD") in way
@@ -45,7 +45,7 @@ def test_page_and_planner_are_killed_in_motion(tmp_path: Path) -> None:
 def takes_over(rig: Rig, number: signal.Signals) -> None:
     """End the guard in motion; the spare goes on with the same drive."""
     rig.run()
-    way, (old, spare) = rig.transitions(), (rig.pid("guard"), rig.pid("spare"))
+    way, (old, spare) = rig.way(), (rig.pid("guard"), rig.pid("spare"))
     before = rig.counter("takeovers", "guard")
     assert old is not None
     os.kill(old, number)
@@ -53,9 +53,9 @@ def takes_over(rig: Rig, number: signal.Signals) -> None:
     rig.wait_for(lambda: rig.shown().get("pid") == spare, "the spare's word")
     assert rig.counter("takeovers", "guard") == before + 1
     rig.wait_plans(30)
-    # a busy machine may hold for a moment; nothing parks and nothing begins anew
-    later = rig.transitions()[len(way) :]
-    assert set(later) <= {("RUN", "HOLD"), ("HOLD", "RUN")}
+    # nothing parks and nothing begins anew
+    rig.wait_state("RUN")
+    assert rig.way() == way
     replaced(rig, "spare", old)
 
 
@@ -81,7 +81,7 @@ def test_a_killed_supervisor_leaves_a_guard_that_parks_and_ends(tmp_path: Path) 
         os.kill(rig.server.pid, signal.SIGKILL)
         rig.server.wait(10.0)
         until(lambda: not rig.leftovers(), "all children to end")
-        assert rig.transitions()[4:] == [("RUN", "PARKING"), BACK_TO_PARKED]
+        assert rig.way()[4:] == [("RUN", "PARKING"), BACK_TO_PARKED]
         verdict = rig.verdict()
     assert_soft(verdict)
     assert verdict["is_parked"]

@@ -137,7 +137,7 @@ def test_whoever_stands_still_for_a_moment_moves_nothing(tmp_path: Path) -> None
             ready(rig, random, (0.0, 0.3))
             figure = one_stop(rig, name, seconds)
             assert figure["outcome"] == "woke"
-        assert figure["holds"] == 1
+        assert figure["holds"] >= 1
         assert rig.end() == 0
         verdict = rig.verdict()
     assert_soft(verdict)

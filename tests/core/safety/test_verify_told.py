@@ -199,7 +199,9 @@ def test_the_worst_acceleration_of_a_passenger_is_told_and_turning_is_none():
     limit = second.max()
     found = check({"passenger_acceleration": limit}, plan, margins=replace(BARE, share=0.5))
     assert (found.reason, found.leg) == (Reason.PASSENGER, None)
-    assert found.when == pytest.approx((second.argmax() + 2 - 3) * 0.002, abs=1e-12)
+    # it speeds up as hard as it slows down: which of the two is told is a matter of rounding
+    worst = np.flatnonzero(second > limit * (1.0 - 1e-9))
+    assert np.abs((worst + 2 - 3) * 0.002 - found.when).min() < 1e-12
     assert found.value == pytest.approx(limit, rel=1e-9)
     assert found.allowed == pytest.approx(limit / 2)
     exact = found.value
