@@ -33,7 +33,10 @@ class Report:
     """What an algorithm tells about its last step, for status, figures and plots.
 
     Attributes:
-        x_max: Position limits in force now, (6,) [m, rad]; the machine's box where not adapted.
+        x_max: Position limits now, (6,) [m, rad]; the machine's box where not adapted.
+        bounded: Axes whose position limit is in force; on the others the legs decide alone.
+        shares: Share of each limit that the last candidate uses, by name; 1 is all that a plan
+            keeps to, so the largest is what binds. Empty where the algorithm does not tell.
         iterations: Iterations of the solver, summed over its problems; 0 without a solver.
         solver_status: Short word: "solved", "none", or why there is no candidate.
         numbers: Anything else worth a curve, by name, SI.
@@ -45,6 +48,8 @@ class Report:
     solver_status: str = "none"
     numbers: dict[str, float] = field(default_factory=dict)
     reference: str = ""
+    bounded: tuple[int, ...] = tuple(range(6))
+    shares: dict[str, float] = field(default_factory=dict)
 
 
 class Cueing(Protocol):

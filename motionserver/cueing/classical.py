@@ -77,7 +77,7 @@ class Classical:
         self._tilt = TiltLoop(filters.low, steps)
         self._slow_share = 1.0 - np.exp(-filters.yaw.omega * period)
         self._slow_yaw = 0.0
-        self._report = Report(frozen(machine.box))
+        self._report = Report(frozen(machine.box), bounded=())
 
     def retune(self, tuning: Tuning) -> None:
         """Take other tunables: gains and the limit of tilt rate."""
@@ -94,7 +94,7 @@ class Classical:
         """Lay out the filters' answer; see `Cueing.propose`."""
         believed = believable(stimulus)
         if believed is None:
-            self._report = Report(frozen(self._machine.box), 0, "not finite")
+            self._report = Report(frozen(self._machine.box), 0, "not finite", bounded=())
             return None
         tuning = self._tuning
         force = tuning.gain * believed.force
@@ -119,6 +119,7 @@ class Classical:
         self._report = Report(
             frozen(self._machine.box),
             numbers={"wanted_x": float(force[0]), "wanted_y": float(force[1])},
+            bounded=(),
         )
         return Candidate(frozen(times), frozen(pose), frozen(velocity), frozen(acceleration))
 

@@ -93,7 +93,7 @@ class SixAxis:
         self._slow_share = 1.0 - exp(-RATE_CORNER * period)
         self._tuning = tuning
         self._build(tuning)
-        self._report = Report(frozen(tuning.box))
+        self._report = Report(frozen(tuning.box), bounded=self._rows.axes)
 
     def _build(self, tuning: Tuning) -> None:
         grid = make_spline_grid(tuning.horizon, self._period, self._pieces)
@@ -185,6 +185,8 @@ class SixAxis:
                 **self._times(instants),
             },
             self._reference.describe(),
+            self._rows.axes,
+            self._rows.shares(result.x),
         )
         return self._candidate(start, nominal, result.x[slacks:].reshape(6, -1).T)
 

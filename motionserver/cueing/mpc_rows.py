@@ -178,6 +178,31 @@ class Rows:
         self._workspace.fill(nominal, box, self._put_single, self._leave)
         return self._lower, self._upper
 
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes whose position limit has rows."""
+        return self._workspace.axes
+
+    def shares(self, x: Array) -> dict[str, float]:
+        """Share of each limit that a solution uses, by name; 1 is all that its rows allow."""
+        slacks = self.layout.slacks
+        change = self.matrix[:, slacks:] @ x[slacks:]
+        upper = 1.0 - (self._upper - change)
+        used = np.maximum(upper, 1.0 - (change - self._lower))
+        blocks = {
+            "leg length": self._length,
+            "leg speed": slice(self._speed.start, self._back.stop),
+            "leg acceleration": self._acceleration,
+            "leg jerk": self._jerk,
+            "tilt rate": self._tilt,
+            **self._workspace.blocks(),
+        }
+        return {
+            name: round(max(0.0, float(used[rows].max())), 4)
+            for name, rows in blocks.items()
+            if rows.stop > rows.start
+        }
+
     def _put_single(self, rows: slice, gradient: Array, gains: Array, room: Array) -> None:
         block = gradient[..., None] * gains[:, None, :]
         self.matrix[rows, self.layout.slacks :] = block.reshape(len(room), -1)

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from motionserver.core.axes import Array, Axis
+from motionserver.core.axes import AXIS_NAMES, Array, Axis
 from motionserver.core.kinematics.hexapod import (
     conditioning,
     is_conditioned,
@@ -79,6 +79,20 @@ class WorkspaceRows:
         # nothing is known yet: look at all of them at once
         self._near = {0, 1, 2}
         self._turn = 0
+
+    def blocks(self) -> dict[str, slice]:
+        """Rows of each limit by its name; box rows axis by axis."""
+        looks, first = len(self._looks), self.box.start
+        axes = {
+            AXIS_NAMES[axis]: slice(first + n * looks, first + (n + 1) * looks)
+            for n, axis in enumerate(self.axes)
+        }
+        return {
+            **axes,
+            "joint angle": self.joint,
+            "conditioning": self.condition,
+            "passenger": self.passenger,
+        }
 
     def fill(self, nominal: Nominal, box: Array, put: Put, leave: Callable[[slice], None]) -> None:
         """Write the rows with ``put``, or ``leave`` those that are far from mattering.

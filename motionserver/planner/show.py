@@ -12,6 +12,7 @@ import numpy as np
 
 from motionserver.core.axes import GRAVITY, Array
 from motionserver.core.state import STILL, Stimulus
+from motionserver.cueing.base import Report
 from motionserver.cueing.measured import MeasuredForce
 from motionserver.cueing.think import Thinker, Thought
 from motionserver.planner.inputs import Inputs
@@ -62,6 +63,16 @@ class Timing:
 
 def _numbers(values: Array) -> list[float]:
     return [round(float(value), 5) for value in values]
+
+
+def _limits(report: Report | None) -> list[float | None]:
+    """Position limits that are in force; None on an axis that has none of its own."""
+    if report is None:
+        return [None] * 6
+    return [
+        value if axis in report.bounded else None
+        for axis, value in enumerate(_numbers(report.x_max))
+    ]
 
 
 class PlannerView:
@@ -150,7 +161,6 @@ class PlannerView:
         is_paused = inputs.is_paused_by_silence(now_ns)
         proposal = None if thought is None else thought.proposal
         report = None if thought is None else thought.report
-        x_max = thinker.tuning.box if report is None else report.x_max
         measured_force = None
         if measured.latest is not None:
             measured_force = _numbers(measured.latest - np.array([0.0, 0.0, GRAVITY]))
@@ -163,7 +173,8 @@ class PlannerView:
             "pid": os.getpid(),
             "t_ns": now_ns,
             "algorithm": thinker.tuning.algorithm,
-            "x_max": _numbers(x_max),
+            "x_max": _limits(report),
+            "limit_shares": {} if report is None else report.shares,
             "wanted_force": _numbers(self._stimulus.force),
             "wanted_rates": _numbers(self._stimulus.rates),
             "felt_force": _numbers(self._felt),

@@ -116,8 +116,13 @@ def _lists(guard: Mapping[str, Any], planner: Mapping[str, Any]) -> Iterator[Met
     yield _gauge("leg_length_metres", "Leg lengths, pin to pin.", "leg", dict(legs))
     speeds = zip(_LEGS, _list(guard.get("leg_speed")), strict=False)
     yield _gauge("leg_speed_metres_per_second", "Leg speeds.", "leg", dict(speeds))
-    x_max = zip(AXIS_NAMES, _list(planner.get("x_max")), strict=False)
-    yield _gauge("position_limit", "X_max in force [m, rad].", "axis", dict(x_max))
+    limits = planner.get("x_max")
+    bounded = {
+        axis: value
+        for axis, value in zip(AXIS_NAMES, limits if isinstance(limits, list) else (), strict=False)
+        if isinstance(value, (int, float))
+    }
+    yield _gauge("position_limit", "X_max on axes that have one [m, rad].", "axis", bounded)
 
 
 def _quantiles(guard: Mapping[str, Any], planner: Mapping[str, Any]) -> Iterator[Metric]:

@@ -62,6 +62,7 @@ class Scene:
         self.since = time.monotonic()
         self.started = self.since
         self.dead = set()
+        self.stuck, self.is_ramping, self.fallback = {}, False, ""
         self.events = []
         self.tick = 0
 
@@ -82,9 +83,16 @@ class Scene:
             return {"ok": False, "state": self.state, "reason": reason}
         return {"ok": True, "state": self.state, "reason": self.reason}
 
+    def told(self):
+        """What the planner reads back from its engine."""
+        in_force = self.book.model.values() | self.stuck
+        return {"in_force": in_force, "is_ramping": self.is_ramping, "retune_error": "",
+                "fallback": self.fallback}  # fmt: skip
+
     def answer_planner(self, request):
         if request["op"] != "side":
-            return self.book.answer(request)
+            answer = self.book.answer(request)
+            return answer | (self.told() if answer["ok"] else {})
         self.beside = request.get("engines", self.beside)
         return {"ok": True, "engines": self.beside, "allowed": list(algorithms())}
 
@@ -189,12 +197,17 @@ class Scene:
         near = np.abs(q) / self.machine.box
         swing = 0.5 + 0.5 * np.sin(0.23 * t + np.arange(6))
         x_max = self.machine.box * (1 - 0.5 * swing**4 - 0.1 * near)
+        six = self.book.model.algorithm == "mpc"
+        shares = {"leg length": 1.0 if abs(wanted[1]) > 0.9 else 0.81, "leg speed": 0.42,
+                  "leg acceleration": 0.17, "leg jerk": 0.09, "tilt rate": 0.88,
+                  "roll": 0.33, "pitch": 0.2, "yaw": 0.21, "conditioning": 0.0}  # fmt: skip
         measured = (force + rng.normal(0, 0.06, 3)).tolist()
         return {
             "pid": os.getpid() + 1,
             "t_ns": time.monotonic_ns(),
             "algorithm": self.book.model.algorithm,
-            "x_max": x_max.tolist(),
+            "x_max": [None] * 3 + x_max.tolist()[3:] if six else x_max.tolist(),
+            "limit_shares": shares if six else {},
             "wanted_force": wanted.tolist(),
             "felt_force": force.tolist(),
             "measured_force": measured,
@@ -209,7 +222,8 @@ class Scene:
             "kappa": 1.0,
             "counters": {"cues": 100 * self.tick, "spikes": 1, "stale": 0, "plans_halved": 41,
                          "plans_refused": 3},
-            "tuning": {"version": self.book.version, "values": self.book.model.model_dump()},
+            "tuning": {"version": self.book.version, "values": self.book.model.values(),
+                       **self.told()},
             "disturbance": [0.0, 0.0, 0.0],
             "rates_hz": {"planner": 100.0},
             "tracking": {"mismatch": 0.061, "alarm": False}, "trouble": "",

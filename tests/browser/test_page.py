@@ -1,5 +1,6 @@
 """The page in a real browser, against the real server process, over the real request sockets."""
 
+import itertools
 import os
 import socket
 import subprocess
@@ -12,6 +13,9 @@ from pathlib import Path
 import pytest
 from browser.chromium import IN_CHROMIUM
 from browser.scene import TOKENS, Peers, Scene, t2_compact, write_configuration
+
+from motionserver.settings.tuning import default_for
+from motionserver.settings.tuning_scope import names_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -284,3 +288,109 @@ def test_page_fits_and_everything_is_drawn(site, visit, tmp_path, width, height)
     assert one.page.evaluate("performance.getEntriesByType('resource').every("
                              "(r) => r.name.startsWith(location.origin))")  # fmt: skip
     one.page.screenshot(path=tmp_path / f"page-{width}.png", full_page=True)
+
+
+def shown_fields(one):
+    script = (
+        "[...document.querySelectorAll('.field')].filter((f) => f.offsetParent)"
+        ".map((f) => f.querySelector('input, select').id.slice(5))"
+    )
+    return set(one.page.evaluate(script))
+
+
+def test_form_shows_the_tunables_of_the_algorithm(site, visit):
+    one = visit()
+    one.identify("tuner")
+    one.expect("#version", "version 1")
+    assert shown_fields(one) == set(names_of("mpc"))
+    one.page.select_option("#tune-algorithm", "classical")
+    assert shown_fields(one) == set(names_of("classical"))
+    one.page.fill("#tune-gain", "0.4")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 2")
+    assert (site.scene.book.model.algorithm, site.scene.book.model.gain) == ("classical", 0.4)
+    one.page.select_option("#tune-algorithm", "mpc")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 3")
+    assert shown_fields(one) == set(names_of("mpc"))
+
+
+def test_what_is_not_in_force_as_asked_for_is_marked(site, visit):
+    one = visit()
+    one.expect("#version", "version 1")
+    assert not one.page.is_visible("#tuning-notice")
+    site.scene.stuck = {"scale": 0.35, "backend": "piqp", "gain": 0.1}
+    site.scene.fallback = "Version 7 of the tuning cannot be used."
+    one.expect("#tuning-notice", "2 values are not in force")
+    one.expect("#tuning-notice", "Version 7")
+    one.expect(".field:has(#tune-backend) .force-text", "in force: piqp, asked for: daqp")
+    one.expect(".field:has(#tune-scale) .force-text", "in force: 0.35, asked for: 0.6")
+    site.scene.stuck, site.scene.fallback, site.scene.is_ramping = {}, "", True
+    one.page.wait_for_selector("#ramp", state="visible")
+    assert not one.page.is_visible("#tuning-notice")
+
+
+def test_list_of_presets_names_the_one_that_is_asked_for(site, visit):
+    def chosen():
+        return one.page.evaluate(
+            "document.querySelector('#preset').selectedOptions[0]?.textContent"
+        )
+
+    def load(name):
+        one.page.select_option("#preset", name)
+        one.page.click("#preset-load")
+        one.expect("#tuning-answer", f"Preset {name}")
+
+    # many changes in a second of the wall clock
+    site.scene.book._now = itertools.count(0, 10).__next__
+    one = visit()
+    one.identify("tuner")
+    one.expect("#version", "version 1")
+    assert chosen() == "default"
+    load("paper-2014")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 2")
+    assert chosen() == "paper-2014"
+    load("passive-3deg")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 3")
+    assert chosen() == "passive-3deg"
+    assert site.scene.book.model == default_for(site.scene.machine)
+    one.page.fill("#tune-scale", "0.5")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 4")
+    assert chosen() == "modified from passive-3deg"
+    one.page.fill("#tune-scale", "0.6")
+    one.page.click("#apply:enabled")
+    one.expect("#version", "version 5")
+    assert chosen() == "passive-3deg"
+
+
+def test_saved_preset_holds_what_the_form_shows(site, visit):
+    one = visit()
+    one.identify("tuner")
+    one.expect("#version", "version 1")
+    one.page.fill("#tune-scale", "0.45")
+    one.page.fill("#preset-name", "mine")
+    one.page.click("#preset-save")
+    one.expect("#tuning-answer", "Saved the form as mine, 1 value of it not applied yet")
+    assert site.scene.book.version == 1
+    one.page.click("#discard")
+    one.page.select_option("#preset", "mine")
+    one.page.click("#preset-load")
+    one.expect("#tuning-answer", "in the form")
+    assert one.value("scale") == "0.45"
+
+
+def test_card_of_limits_shows_the_box_only_where_it_is_one(site, visit):
+    one = visit()
+    one.identify("operator")
+    one.page.click("#engage:enabled")
+    one.expect("#state", "RUN")
+    plot = "#xmax .plot:nth-child({}) p"
+    for number in (1, 2, 3):
+        one.expect(plot.format(number), "legs decide")
+    one.expect(plot.format(4), "±")
+    one.expect("#shares", "leg length")
+    site.scene.book.answer({"op": "tune", "if_version": 1, "changes": {"algorithm": "thondel2014"}})
+    one.expect(plot.format(1), "±")

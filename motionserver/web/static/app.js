@@ -5,6 +5,7 @@ import { Engines } from "./engines.js";
 import { FaultHelp } from "./faulthelp.js";
 import { Hexapod } from "./hexapod.js";
 import { Legs } from "./legs.js";
+import { showShares } from "./limits.js";
 import { duration, showLog, showNumbers, showState } from "./panels.js";
 import { Plots } from "./plots.js";
 import { Stream } from "./stream.js";
@@ -113,11 +114,12 @@ function render() {
   faultHelp.show(status);
   legs.show(status.guard);
   showNumbers(status);
+  showShares(status);
   showLog(status);
   engines.show(status);
   plots.beside(engines.lines(status), (name) => engines.colour(name));
   plots.draw();
-  tuning.noticed(status.planner?.tuning?.version);
+  tuning.noticed(status.planner?.tuning);
   hexapod.status = status;
 }
 

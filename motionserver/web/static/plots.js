@@ -81,7 +81,9 @@ export class Plots {
     this.rows.push({
       time, wanted: three(planner.wanted_force), felt: three(planner.felt_force), measured: three(planner.measured_force),
       sides: new Map(list(planner.side?.engines).map((engine) => [engine.name, three(engine.felt_force)])),
-      x_max: list(planner.x_max), pose: list(guard.pose), box: list(status.machine?.box),
+      x_max: list(planner.x_max), pose: list(guard.pose),
+      // the box is drawn only where it is a limit: elsewhere the legs decide
+      box: list(status.machine?.box).map((size, i) => (isNumber(list(planner.x_max)[i]) ? size : null)),
     });
     while (this.rows.length && this.rows[0].time < time - SPAN - 1) this.rows.shift();
   }
@@ -101,8 +103,8 @@ export class Plots {
       const [name, unit, k, digits] = POSE[i];
       const column = (key, sign = 1) => rows.map((r) => (isNumber(r[key][i]) ? sign * r[key][i] * k : null));
       plot.plot.setData([times, column("x_max"), column("x_max", -1), column("box"), column("box", -1), column("pose")]);
-      const share = last.x_max[i] / last.box[i];
-      caption(plot.title, name, `±${fixed(last.x_max[i] * k, digits)} ${unit}${isNumber(share) ? ` (${Math.round(100 * share)} %)` : ""}`);
+      const limit = last.x_max[i], share = limit / last.box[i], now = `${fixed(last.pose[i] * k, digits)} ${unit}`;
+      caption(plot.title, name, isNumber(limit) ? `${now} of ±${fixed(limit * k, digits)} ${unit}${isNumber(share) ? ` (${Math.round(100 * share)} %)` : ""}` : `${now}, legs decide`);
     });
   }
 }

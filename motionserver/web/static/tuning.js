@@ -1,11 +1,16 @@
 // The tuning form: what is in force, what is pending, and what the server said about it.
 import { send, sentence } from "./api.js";
 import { byId, make, put } from "./dom.js";
+import { Presets } from "./presets.js";
 
 const ORDER = ["Feel", "Perception", "Workspace", "Optimiser", "Six axes"];
 const LASTING = 6; // looks, ten a second
 const AGAIN = 30; // looks until the form is asked for again
 const isNumber = (field) => !field.choices && !field.is_file;
+const word = (value, field) => {
+  if (typeof value === "boolean") return value ? "on" : "off";
+  return `${typeof value === "number" ? Number(value.toPrecision(4)) : value} ${unit(field)}`.trim();
+};
 const unit = (field) => field.unit.replace("s2", "s²").replace(/^deg/, "°");
 
 export class Tuning {
@@ -16,12 +21,11 @@ export class Tuning {
     this.mayTune = false;
     this.busy = false;
     this.differing = 0;
+    this.loaded = null;
+    this.presets = new Presets(this);
     byId("tuning").addEventListener("submit", (e) => { e.preventDefault(); this.apply(); });
-    byId("discard").addEventListener("click", () => this.fill(this.values));
+    byId("discard").addEventListener("click", () => { this.loaded = this.presets.picked = null; this.fill(this.values); this.presets.show(); });
     byId("undo").addEventListener("click", () => this.undo());
-    byId("preset-load").addEventListener("click", () => this.loadPreset());
-    byId("presets").addEventListener("submit", (e) => { e.preventDefault(); this.savePreset(); });
-    byId("preset").addEventListener("change", () => this.aboutPreset());
   }
 
   async load() {
@@ -30,7 +34,17 @@ export class Tuning {
     if (!this.rows.size) this.build(answer.body.fields);
     // what somebody has typed meanwhile stays
     if (this.version === null || Object.keys(this.changes()).length === 0) this.take(answer.body);
-    await this.listPresets();
+    await this.presets.list();
+  }
+
+  // Tunables belong to algorithms: the form has those of the one chosen in it.
+  isLive(field) {
+    return !field.algorithms || field.algorithms.includes(this.rows.get("algorithm").input.value);
+  }
+
+  showLive() {
+    for (const row of this.rows.values()) row.box.hidden = !this.isLive(row.field);
+    for (const group of byId("fields").children) group.hidden = ![...group.querySelectorAll(".field")].some((box) => !box.hidden);
   }
 
   build(fields) {
@@ -67,12 +81,13 @@ export class Tuning {
     const help = make("p", "help", `${field.meaning} `);
     if (isNumber(field)) help.append(make("span", "range", `${field.min} to ${field.max} ${unit(field)}`.trim()));
     const wrong = make("p", "wrong-text");
-    wrong.hidden = true;
+    const force = make("p", "force-text");
+    wrong.hidden = force.hidden = true;
     box.append(name, input);
     if (isNumber(field)) box.append(make("span", "unit", unit(field)));
-    box.append(help, wrong);
+    box.append(force, help, wrong);
     input.addEventListener("input", () => { this.mark(field.name, ""); this.refresh(); });
-    this.rows.set(field.name, { field, box, input, wrong });
+    this.rows.set(field.name, { field, box, input, wrong, force });
     return box;
   }
 
@@ -84,7 +99,12 @@ export class Tuning {
 
   changes() {
     const out = {};
-    for (const [name, row] of this.rows) if (this.read(row) !== this.values[name]) out[name] = this.read(row);
+    for (const [name, row] of this.rows) {
+      const value = this.read(row);
+      if (value === this.values[name]) continue;
+      // what is hidden changes only with a preset, which is a whole state
+      if (this.isLive(row.field) || (this.loaded && this.loaded.values[name] === value)) out[name] = value;
+    }
     return out;
   }
 
@@ -99,7 +119,30 @@ export class Tuning {
   take({ version, values }) {
     this.version = version;
     this.values = values;
+    // it is in force now, or was already
+    if (this.loaded) this.presets.last = this.loaded.name;
+    this.loaded = this.presets.picked = null;
     this.fill(values);
+    this.presets.show();
+  }
+
+  // What is asked for against what the engine itself has; both are shown where they differ.
+  showForce(told) {
+    if (!told || !this.rows.size || told.version !== this.version) return;
+    const now = told.in_force, text = [told.fallback, told.retune_error && `The last change did not come into force: ${told.retune_error}.`];
+    byId("ramp").hidden = !told.is_ramping;
+    let apart = 0;
+    for (const [name, row] of this.rows) {
+      const differs = Boolean(now) && this.isLive(row.field) && now[name] !== this.values[name];
+      row.force.hidden = !differs;
+      if (!differs) continue;
+      apart += 1;
+      put(row.force, `in force: ${word(now[name], row.field)}, asked for: ${word(this.values[name], row.field)}`);
+    }
+    if (apart && !told.is_ramping) text.push(`${apart} value${apart > 1 ? "s are" : " is"} not in force as asked for, see the marked fields.`);
+    const notice = text.filter(Boolean).join(" ");
+    byId("tuning-notice").hidden = notice === "";
+    put(byId("tuning-notice"), notice);
   }
 
   mark(name, text) {
@@ -112,6 +155,7 @@ export class Tuning {
   }
 
   refresh() {
+    if (this.rows.size) this.showLive();
     const changes = this.changes();
     const count = Object.keys(changes).length;
     for (const [name, row] of this.rows) row.box.classList.toggle("changed", name in changes);
@@ -127,7 +171,9 @@ export class Tuning {
 
   // Somebody else changed the tuning: show it, unless changes are pending here. The status may be
   // older than an answer just received, so a difference counts only once it has lasted.
-  noticed(version) {
+  noticed(told) {
+    const version = told?.version;
+    this.showForce(told);
     const differs = version !== undefined && version !== this.version && !this.busy;
     this.differing = differs ? this.differing + 1 : 0;
     // a planner that came after this page: there is no form yet
@@ -151,15 +197,26 @@ export class Tuning {
       this.take(answer.body);
       this.say(done(answer.body));
     } else {
-      for (const item of answer.body.details || []) {
-        if (this.mark(item.field, `${item.message}; allowed ${item.allowed}`)) this.rows.get(item.field).box.parentNode.open = true;
-      }
-      const wrong = (answer.body.details || []).length;
-      this.say(wrong ? `Nothing was changed: ${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields. ${sentence(answer.body)}` : sentence(answer.body), true);
+      this.explain(answer.body, "Nothing was changed");
       if (answer.status === 412) this.values = (await send("GET", "/api/tuning")).body.values || this.values;
       if (answer.status === 412 && answer.body.version) this.version = answer.body.version;
       this.refresh();
     }
+  }
+
+  // Refusals of values stand at their fields; those without one, or hidden, in the line below.
+  explain(body, what) {
+    const details = body.details || [];
+    const other = [];
+    for (const item of details) {
+      const row = this.rows.get(item.field);
+      this.mark(item.field, `${item.message}; allowed ${item.allowed}`);
+      if (row && this.isLive(row.field)) row.box.parentNode.open = true;
+      else other.push(`${item.field}: ${item.message}`);
+    }
+    const wrong = details.length - other.length;
+    const marked = wrong ? [`${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields`] : [];
+    this.say(details.length ? `${what}: ${[...marked, ...other].join("; ")}. ${sentence(body)}` : sentence(body), true);
   }
 
   apply() {
@@ -176,6 +233,7 @@ export class Tuning {
     if (Object.keys(this.changes()).length === 0) this.take(answer.body);
     else {
       Object.assign(this, { version: answer.body.version, values: answer.body.values });
+      this.presets.show();
       this.rows.get("algorithm").input.value = name;
       this.refresh();
     }
@@ -184,41 +242,5 @@ export class Tuning {
 
   undo() {
     return this.change("POST", "/api/tuning/undo", { ifMatch: this.version }, (body) => `Undone; now version ${body.version}.`);
-  }
-
-  async listPresets() {
-    const answer = await send("GET", "/api/presets");
-    if (!answer.ok) return;
-    this.presets = answer.body.presets;
-    const select = byId("preset");
-    const chosen = select.value;
-    select.replaceChildren(...this.presets.map((p) => {
-      const option = make("option", "", p.built_in ? p.name : `${p.name} (yours)`);
-      option.value = p.name;
-      return option;
-    }));
-    if (chosen) select.value = chosen;
-    this.aboutPreset();
-  }
-
-  aboutPreset() {
-    put(byId("preset-about"), this.presets?.find((p) => p.name === byId("preset").value)?.about || "");
-  }
-
-  async loadPreset() {
-    const name = byId("preset").value;
-    const answer = await send("GET", `/api/presets/${encodeURIComponent(name)}`);
-    if (!answer.ok) return this.say(sentence(answer.body), true);
-    this.fill({ ...this.values, ...answer.body.values });
-    const count = Object.keys(this.changes()).length;
-    this.say(count ? `Preset ${name} is in the form: look at it, then apply.` : `Preset ${name} is what is in force.`);
-  }
-
-  async savePreset() {
-    const name = byId("preset-name").value.trim();
-    if (!/^[a-z0-9-]{1,40}$/.test(name)) return this.say("A preset's name is a-z, 0-9 and -, at most 40.", true);
-    const answer = await send("PUT", `/api/presets/${encodeURIComponent(name)}`, { body: {} });
-    this.say(answer.ok ? `Saved what is in force as ${name}.` : sentence(answer.body), !answer.ok);
-    if (answer.ok) await this.listPresets();
   }
 }
