@@ -125,7 +125,9 @@ def test_choice_that_is_accepted_is_in_force_and_any_other_refused(
     if answer["ok"]:
         assert after["values"][name] == value
     else:
-        assert (name, value) == ("backend", "hpipm")
+        # a solver that is not installed; a forecast from drives without the file that holds it
+        assert (name, value) in (("backend", "hpipm"), ("reference", "learned"))
+        assert answer["details"][0]["field"] in ("backend", "predictor")
         assert after["values"] == before["values"]
         assert after["version"] == before["version"]
 

@@ -204,19 +204,18 @@ export class Tuning {
     }
   }
 
-  // Refusals of values stand at their fields; those without one, or hidden, in the line below.
+  // Refusals of values stand at their fields as well, where the form shows them.
   explain(body, what) {
-    const details = body.details || [];
-    const other = [];
-    for (const item of details) {
+    let marked = 0;
+    for (const item of body.details || []) {
       const row = this.rows.get(item.field);
       this.mark(item.field, `${item.message}; allowed ${item.allowed}`);
-      if (row && this.isLive(row.field)) row.box.parentNode.open = true;
-      else other.push(`${item.field}: ${item.message}`);
+      if (!row || !this.isLive(row.field)) continue;
+      row.box.parentNode.open = true;
+      marked += 1;
     }
-    const wrong = details.length - other.length;
-    const marked = wrong ? [`${wrong} value${wrong > 1 ? "s are" : " is"} not allowed, see the marked fields`] : [];
-    this.say(details.length ? `${what}: ${[...marked, ...other].join("; ")}. ${sentence(body)}` : sentence(body), true);
+    const seen = marked ? `${marked} value${marked > 1 ? "s are" : " is"} not allowed, see the marked fields. ` : "";
+    this.say(`${what}: ${seen}${sentence(body)}`, true);
   }
 
   apply() {
