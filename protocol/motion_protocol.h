@@ -29,6 +29,7 @@
 #define MOTION_STATUS_CRC_SEED 0x076E0CACu
 #define MOTION_PREVIEW_MAX 40
 #define MOTION_NOTICE_TEXT_MAX 240
+#define MOTION_PREVIEW_LATEST 40000 /* of a timed preview [0.1 ms] */
 
 enum motion_mode { MOTION_DRIVE = 0, MOTION_PAUSE = 1, MOTION_TELEPORT = 2, MOTION_BYE = 3 };
 
@@ -59,6 +60,7 @@ enum motion_block {
   MOTION_BLOCK_MOTION = 1,
   MOTION_BLOCK_PREVIEW = 2,
   MOTION_BLOCK_DRIVER = 3,
+  MOTION_BLOCK_TIMED_PREVIEW = 4, /* a packet with it is of minor version 1 */
   MOTION_BLOCK_STATUS = 64,
   MOTION_BLOCK_NOTICE = 65
 };
@@ -110,6 +112,11 @@ typedef struct {
   uint8_t reserved[2];
   float dt, start;
 } motion_wire_preview; /* followed by count times float[6] */
+
+typedef struct {
+  uint16_t count;
+  uint8_t reserved[2];
+} motion_wire_timed_preview; /* followed by count times float[6], then count times uint16_t [0.1 ms] */
 
 typedef struct {
   float throttle, brake, clutch, steering;

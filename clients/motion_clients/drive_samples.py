@@ -85,6 +85,22 @@ class Recording:
         """Index of the last sample not later than `time` [s], of the first if none is."""
         return max(0, bisect_right(self.samples, time, key=_time_of) - 1)
 
+    def values_at(self, time: float) -> tuple[float, float, float, float, float, float]:
+        """Acceleration and rates at `time` [s], on the straight line between two samples."""
+        index = min(self.index_at(time), len(self.samples) - 2)
+        before, after = self.samples[index], self.samples[index + 1]
+        share = (time - before.time) / (after.time - before.time)
+        share = min(max(share, 0.0), 1.0)
+        ax, ay, az, p, q, r = (
+            a + share * (b - a)
+            for a, b in zip(
+                (*before.acceleration, *before.rates),
+                (*after.acceleration, *after.rates),
+                strict=True,
+            )
+        )
+        return ax, ay, az, p, q, r
+
 
 def _time_of(sample: RecordedSample) -> float:
     return sample.time

@@ -11,16 +11,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
-from motion_protocol import DEFAULT_PORT, PREVIEW_MAX, Flags, Mode, Preview
+from motion_protocol import (
+    DEFAULT_PORT,
+    PREVIEW_MAX,
+    Flags,
+    Mode,
+    TimedPreview,
+    preview_times,
+)
 
 from .beamng import MotionSimEncoder
+from .drive_samples import PreviewSample
 from .recording import RecordedSample, Recording, read_recording
 from .sender import CueSender
 
 Format: TypeAlias = Literal["native", "beamng"]
 FORMATS: Final[tuple[Format, ...]] = ("native", "beamng")
 _SLICE: Final = 0.1  # longest wait between two looks at `stop` [s]
-_PREVIEW_DT: Final = 0.05
+LONGEST_PREVIEW: Final = 2.0
+"""A preview further ahead is not sent along [s]."""
+FARTHEST: Final = 4.0
+"""The latest instant of a preview that a packet can carry [s]."""
+CLOSEST: Final = 2e-4
+"""Two instants of a preview further apart than this stay two when they are rounded [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,9 +136,9 @@ def _check(fmt: str, speed: float, preview: float, port: int, key: bytes | None)
         raise ValueError(
             f"speed {speed} is out of range; allowed are 0.01 to 100 (1 = as recorded)"
         )
-    if not 0.0 <= preview <= PREVIEW_MAX * _PREVIEW_DT:
+    if not 0.0 <= preview <= LONGEST_PREVIEW:
         raise ValueError(
-            f"preview {preview} s is out of range; allowed are 0 to {PREVIEW_MAX * _PREVIEW_DT} s"
+            f"preview {preview} s is out of range; allowed are 0 to {LONGEST_PREVIEW} s"
         )
     if fmt != "native" and (preview or key is not None):
         raise ValueError(f"format {fmt} can carry neither preview nor signature: leave both out")
@@ -207,30 +220,35 @@ def _mode_of(sample: RecordedSample) -> Mode:
     return Mode.PAUSE if sample.mode is Mode.BYE else sample.mode
 
 
-def told_ahead(sample: RecordedSample) -> Preview | None:
-    """What the recorded sender told ahead, on even steps; None if nothing."""
-    told = sample.preview[:PREVIEW_MAX]
+def told_ahead(sample: RecordedSample) -> TimedPreview | None:
+    """What the recorded sender told ahead, at its instants; None if nothing.
+
+    What a packet cannot carry is left out: the past, what lies beyond 4 s or less than 0.2 ms after
+    the one before, more than 40 samples.
+    """
+    told: list[PreviewSample] = []
+    for one in sample.preview:
+        is_later = not told or one.time >= told[-1].time + CLOSEST
+        if 0.0 <= one.time <= FARTHEST and is_later and len(told) < PREVIEW_MAX:
+            told.append(one)
     if not told:
         return None
-    first, last = told[0].time, told[-1].time
-    step = (last - first) / (len(told) - 1) if len(told) > 1 else _PREVIEW_DT
-    return Preview(step, first, tuple((*one.acceleration, *one.rates) for one in told))
+    return TimedPreview(
+        tuple(one.time for one in told),
+        tuple((*one.acceleration, *one.rates) for one in told),
+    )
 
 
-def preview_of(recording: Recording, sample: RecordedSample, horizon: float) -> Preview | None:
-    """What the recording does after a sample, each 50 ms, up to its end; None if nothing is left.
+def preview_of(recording: Recording, sample: RecordedSample, horizon: float) -> TimedPreview | None:
+    """What the recording does after a sample, up to its end; None if nothing is left.
 
     Args:
         recording: The whole drive.
         sample: Where to look ahead from.
         horizon: How far [s].
     """
-    ends = min(horizon, recording.samples[-1].time - sample.time)
-    count = min(PREVIEW_MAX, int(ends / _PREVIEW_DT + 1e-6))
-    if count == 0:
+    left = recording.samples[-1].time - sample.time + 1e-6
+    times = tuple(time for time in preview_times(horizon) if time <= left)
+    if not times:
         return None
-    ahead = (
-        recording.samples[recording.index_at(sample.time + _PREVIEW_DT * step + 1e-6)]
-        for step in range(1, count + 1)
-    )
-    return Preview(_PREVIEW_DT, _PREVIEW_DT, tuple((*s.acceleration, *s.rates) for s in ahead))
+    return TimedPreview(times, tuple(recording.values_at(sample.time + time) for time in times))

@@ -22,6 +22,7 @@ from motion_protocol import (
     ProtocolError,
     Reference,
     Status,
+    TimedPreview,
     Vector3,
     decode_status,
     encode_cue,
@@ -112,7 +113,7 @@ class CueSender:
         sim_time_ns: int | None = None,
         mode: Mode = Mode.DRIVE,
         flags: Flags | None = None,
-        preview: Preview | None = None,
+        preview: Preview | TimedPreview | None = None,
         driver: DriverInputs | None = None,
     ) -> int:
         """Send one cue, ISO 8855 body axes.
@@ -128,7 +129,8 @@ class CueSender:
             sim_time_ns: The simulation's time of the values [ns]; this sender's own if None.
             mode: What the simulator is doing.
             flags: Further flags; gravity is flagged by itself.
-            preview: What is expected next.
+            preview: What is expected next; `motion_protocol.preview_times` chooses instants for a
+                `TimedPreview`.
             driver: What the driver does at the controls.
 
         Returns:
@@ -234,7 +236,7 @@ class CueSender:
         motion: Motion | None,
         flags: Flags,
         sim_time_ns: int | None,
-        preview: Preview | None,
+        preview: Preview | TimedPreview | None,
         driver: DriverInputs | None,
     ) -> int:
         now = self._clock_ns()

@@ -44,7 +44,7 @@ def evaluate(
         str, typer.Option("--tuning", help="tunables", metavar="PRESET|FILE.toml")
     ] = "",
     preview: Annotated[
-        float, typer.Option("--preview", help="seconds told ahead, perfectly", metavar="S")
+        float, typer.Option("--preview", help="seconds told ahead without error", metavar="S")
     ] = 0.0,
     disturb: Annotated[
         bool, typer.Option("--disturb", help="late, failed and senseless plans")

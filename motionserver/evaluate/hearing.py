@@ -6,6 +6,7 @@ from collections import Counter
 from typing import Final
 
 import numpy as np
+from motion_protocol import preview_times
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.intake.freshness import SECOND_NS
@@ -14,8 +15,6 @@ from motionserver.core.intake.intake import Intake
 from motionserver.core.state import DriveMode, Preview, VehicleMotion
 from motionserver.evaluate.recording import Recording
 
-PREVIEW_STEP: Final = 0.01
-"""Spacing of a preview's samples [s]: all that a recording holds, more than a packet carries."""
 LONGEST_PREVIEW: Final = 4.0
 """A preview further ahead is not told [s]."""
 _BLOCK: Final = 512
@@ -26,7 +25,8 @@ class Hearing:
 
     Args:
         recording: The drive.
-        preview: How far it is told ahead [s]; 0 for what its sender itself told.
+        preview: How far it is told ahead, as closely as one packet carries it [s]; 0 for what its
+            sender itself told.
         gate: Believes or refuses.
         intake: Takes what is believed.
         refused: Counts what is not.
@@ -43,13 +43,10 @@ class Hearing:
         intake: Intake,
         refused: Counter[str],
     ) -> None:
-        if not 0.0 <= preview <= LONGEST_PREVIEW:
-            raise ValueError(
-                f"preview of {preview:g} s: give a time from 0 to {LONGEST_PREVIEW:g} s"
-            )
         self._recording, self._gate, self._intake = recording, gate, intake
         self._refused, self._given = refused, 0
-        self._steps = np.arange(1, int(preview / PREVIEW_STEP + 1e-9) + 1) * PREVIEW_STEP
+        # no more than a packet carries, at the instants that senders choose
+        self._steps = np.array(preview_times(preview))
         self._columns = (*recording.force.T, *recording.rates.T)
         self._block: tuple[int, Array, Array, Array] | None = None
 

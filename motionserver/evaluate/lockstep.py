@@ -87,7 +87,7 @@ def drive(
         planner_hz: Planner rate [Hz].
         vehicle_head: Driver's head from the recorded point, vehicle axes, (3,) [m]; zero if None.
         preview: How far the recording itself is told ahead, as by a simulator that knows what
-            comes [s], at most 4; 0 for none.
+            comes [s], at most 4; 0 for none. No more than one packet carries.
         thinker: Another planner than that of ``tuning``.
         disturbance: Late, failed and senseless plans; none if None.
         progress: Called about once per second of the drive with the share done, 0..1.

@@ -58,8 +58,9 @@ def remarks(result: EvaluateResult) -> list[str]:
     ]
     if result.preview > 0.0:
         out.append(
-            f"the algorithms were told {result.preview:g} s ahead, the rivals nothing: an upper "
-            "bound, not what a simulator without preview gets"
+            f"the algorithms were told {result.preview:g} s ahead, as closely as one packet "
+            "carries it, the rivals nothing: an upper bound, not what a simulator without preview "
+            "gets"
         )
     if result.disturbance is not None:
         trouble = result.disturbance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from motion_protocol import Cue, Flags, ProtocolError, decode_cue
+from motion_protocol import Cue, Flags, ProtocolError, TimedPreview, decode_cue
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.kinematics.rotation import gravity_in_body
@@ -66,7 +66,10 @@ def _preview(cue: Cue, gravity: Array) -> Preview | None:
     if cue.preview is None or not cue.preview.samples:
         return None
     samples = np.array(cue.preview.samples)
-    times = cue.preview.start + cue.preview.dt * np.arange(len(samples))
+    if isinstance(cue.preview, TimedPreview):
+        times = np.array(cue.preview.times)
+    else:
+        times = cue.preview.start + cue.preview.dt * np.arange(len(samples))
     return Preview(frozen(times), frozen(samples[:, :3] + gravity), frozen(samples[:, 3:]))
 
 

@@ -33,6 +33,7 @@ from .status import (
     decode_status,
     encode_status,
 )
+from .timed_preview import TimedPreview, preview_times
 
 DEFAULT_PORT = 4600
 """UDP port on which the server takes cues unless configured otherwise."""
@@ -71,6 +72,7 @@ __all__ = [
     "Sample",
     "SizeError",
     "Status",
+    "TimedPreview",
     "UnknownValueError",
     "Vector3",
     "VersionError",
@@ -78,5 +80,6 @@ __all__ = [
     "decode_status",
     "encode_cue",
     "encode_status",
+    "preview_times",
     "sequence_delta",
 ]

@@ -54,7 +54,7 @@ DRIVER_LAYOUT: Final = Layout(
         ("", "3x"),
     ),
 )
-_SAMPLE: Final = struct.Struct("<6f")
+SAMPLE: Final = struct.Struct("<6f")
 _SAMPLE_FIELDS: Final = ("ax", "ay", "az", "p", "q", "r")
 
 
@@ -147,7 +147,7 @@ def pack_motion(motion: Motion) -> bytes:
 
 def unpack_motion(data: bytes, offset: int, length: int) -> Motion:
     """Read the body of the motion block."""
-    _check_length(MOTION_LAYOUT, offset, length, MOTION_LAYOUT.size)
+    check_length(MOTION_LAYOUT, offset, length, MOTION_LAYOUT.size)
     ax, ay, az, p, q, r, roll, pitch, yaw, speed, reference, valid = MOTION_LAYOUT.unpack(
         data, offset
     )
@@ -169,30 +169,39 @@ def unpack_motion(data: bytes, offset: int, length: int) -> Motion:
 
 def pack_preview(preview: Preview) -> bytes:
     """Write the body of the preview block."""
-    samples = preview.samples
+    body = pack_samples(preview.samples, "preview")
+    return PREVIEW_LAYOUT.pack(len(preview.samples), preview.dt, preview.start) + body
+
+
+def pack_samples(samples: tuple[Sample, ...], block: str) -> bytes:
+    """Write 1 to 40 samples of a preview block.
+
+    Raises:
+        FieldError: They are too many or none, or a value does not fit a 32-bit float.
+        NotFiniteError: A value is NaN or infinite.
+    """
     if not 1 <= len(samples) <= PREVIEW_MAX:
         raise FieldError(
-            f"preview.samples has {len(samples)} entries, 1 to {PREVIEW_MAX} are allowed; "
-            f"widen dt or leave the preview out",
-            field="preview.samples",
+            f"{block}.samples has {len(samples)} entries, 1 to {PREVIEW_MAX} are allowed; "
+            f"space them wider or leave the preview out",
+            field=f"{block}.samples",
         )
-    head = PREVIEW_LAYOUT.pack(len(samples), preview.dt, preview.start)
     try:
-        body = b"".join(_SAMPLE.pack(*sample) for sample in samples)
+        body = b"".join(SAMPLE.pack(*sample) for sample in samples)
     except (struct.error, OverflowError) as error:
         raise FieldError(
-            f"preview.samples cannot be written ({error}); "
+            f"{block}.samples cannot be written ({error}); "
             f"each is six numbers (ax, ay, az, p, q, r) within the range of a 32-bit float",
-            field="preview.samples",
+            field=f"{block}.samples",
         ) from None
-    _check_samples(samples)
-    return head + body
+    check_samples(samples, block)
+    return body
 
 
 def unpack_preview(data: bytes, offset: int, length: int) -> Preview:
     """Read the body of the preview block."""
     if length < PREVIEW_LAYOUT.size:
-        _check_length(PREVIEW_LAYOUT, offset, length, PREVIEW_LAYOUT.size)
+        check_length(PREVIEW_LAYOUT, offset, length, PREVIEW_LAYOUT.size)
     count, dt, start = PREVIEW_LAYOUT.unpack(data, offset)
     if not 1 <= count <= PREVIEW_MAX:
         raise BlockLengthError(
@@ -201,9 +210,9 @@ def unpack_preview(data: bytes, offset: int, length: int) -> Preview:
             field="preview.count",
         )
     first = offset + PREVIEW_LAYOUT.size
-    _check_length(PREVIEW_LAYOUT, offset, length, PREVIEW_LAYOUT.size + count * _SAMPLE.size)
-    samples = tuple(_SAMPLE.iter_unpack(data[first : offset + length]))
-    _check_samples(samples)
+    check_length(PREVIEW_LAYOUT, offset, length, PREVIEW_LAYOUT.size + count * SAMPLE.size)
+    samples = tuple(SAMPLE.iter_unpack(data[first : offset + length]))
+    check_samples(samples, "preview")
     return Preview(dt, start, samples)
 
 
@@ -216,11 +225,12 @@ def pack_driver(driver: DriverInputs) -> bytes:
 
 def unpack_driver(data: bytes, offset: int, length: int) -> DriverInputs:
     """Read the body of the driver inputs block."""
-    _check_length(DRIVER_LAYOUT, offset, length, DRIVER_LAYOUT.size)
+    check_length(DRIVER_LAYOUT, offset, length, DRIVER_LAYOUT.size)
     return DriverInputs(*DRIVER_LAYOUT.unpack(data, offset))
 
 
-def _check_length(layout: Layout, offset: int, length: int, expected: int) -> None:
+def check_length(layout: Layout, offset: int, length: int, expected: int) -> None:
+    """Refuse a block whose body has another length than its layout and count say."""
     if length != expected:
         raise BlockLengthError(
             f"the {layout.name} block at byte {offset} has {length} bytes, expected {expected}; "
@@ -229,11 +239,12 @@ def _check_length(layout: Layout, offset: int, length: int, expected: int) -> No
         )
 
 
-def _check_samples(samples: tuple[Sample, ...]) -> None:
+def check_samples(samples: tuple[Sample, ...], block: str) -> None:
+    """Refuse samples of a block that are not all finite."""
     if isfinite(sum(map(sum, samples))):
         return
     field, value = next(
-        (f"preview[{index}].{name}", value)
+        (f"{block}[{index}].{name}", value)
         for index, sample in enumerate(samples)
         for name, value in zip(_SAMPLE_FIELDS, sample, strict=True)
         if not isfinite(value)

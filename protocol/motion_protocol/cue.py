@@ -21,7 +21,14 @@ from .blocks import (
     unpack_preview,
 )
 from .errors import BlockDuplicateError, BlockMissingError, UnknownValueError
-from .framing import block, blocks, close_frame, kind, open_frame
+from .framing import VERSION, block, blocks, close_frame, kind, open_frame
+from .timed_preview import (
+    TIMED_PREVIEW,
+    TIMED_PREVIEW_MINOR,
+    TimedPreview,
+    pack_timed_preview,
+    unpack_timed_preview,
+)
 
 CUE_LAYOUT: Final = b"MCUE/1 4sBBBBHHB3xIIQQI HH 1:10fBB2x 2:H2x2f*6f 3:4fb3x"
 CUE: Final = kind(b"MCUE", CUE_LAYOUT)
@@ -71,7 +78,8 @@ class Cue:
         motion: How the vehicle moves; None is possible only with `Mode.BYE`.
         mode: What the simulator is doing.
         flags: How the values are to be read.
-        preview: What is expected next, if the sender knows.
+        preview: What is expected next, if the sender knows, at equal distances or at instants of
+            its own.
         driver: What the driver does at the controls, if the sender tells.
     """
 
@@ -82,7 +90,7 @@ class Cue:
     motion: Motion | None
     mode: Mode = Mode.DRIVE
     flags: Flags = NO_FLAGS
-    preview: Preview | None = None
+    preview: Preview | TimedPreview | None = None
     driver: DriverInputs | None = None
 
 
@@ -101,7 +109,11 @@ def encode_cue(cue: Cue, key: bytes | None = None) -> bytes:
     if cue.motion is None and cue.mode is not Mode.BYE:
         raise _motion_missing(cue.mode)
     payload = b"" if cue.motion is None else block(MOTION, pack_motion(cue.motion))
-    if cue.preview is not None:
+    minor = VERSION[1]
+    if isinstance(cue.preview, TimedPreview):
+        minor = TIMED_PREVIEW_MINOR
+        payload += block(TIMED_PREVIEW, pack_timed_preview(cue.preview))
+    elif cue.preview is not None:
         payload += block(PREVIEW, pack_preview(cue.preview))
     if cue.driver is not None:
         payload += block(DRIVER, pack_driver(cue.driver))
@@ -115,6 +127,7 @@ def encode_cue(cue: Cue, key: bytes | None = None) -> bytes:
         sequence=cue.sequence,
         sim_time_ns=cue.sim_time_ns,
         sender_time_ns=cue.sender_time_ns,
+        minor=minor,
     )
 
 
@@ -157,7 +170,7 @@ def decode_cue(data: bytes, key: bytes | None = None) -> Cue:
         motion,
         mode,
         _FLAGS[frame.flags & _FLAGS_MASK],
-        found.get(PREVIEW),
+        found.get(TIMED_PREVIEW) or found.get(PREVIEW),
         found.get(DRIVER),
     )
 
@@ -174,5 +187,10 @@ def _motion_missing(mode: Mode) -> BlockMissingError:
 _MODES: Final = tuple(Mode)
 _FLAGS_MASK: Final = 0x001F
 _FLAGS: Final = tuple(Flags(bits) for bits in range(_FLAGS_MASK + 1))
-_UNPACK: Final = {MOTION: unpack_motion, PREVIEW: unpack_preview, DRIVER: unpack_driver}
+_UNPACK: Final = {
+    MOTION: unpack_motion,
+    PREVIEW: unpack_preview,
+    DRIVER: unpack_driver,
+    TIMED_PREVIEW: unpack_timed_preview,
+}
 _KNOWN: Final = frozenset(_UNPACK)

@@ -121,13 +121,17 @@ def test_key_and_preview_are_sent(listener):
     run(path, listener, clock, key=key, preview=2.0, stop=lambda: clock.now > 10**9)
     cue = decode_cue(listener.recv(2000), key)
     assert len(cue.preview.samples) == 40
-    assert (cue.preview.dt, cue.preview.start) == pytest.approx((0.05, 0.05))
+    # every 10 ms for 0.2 s, then 1.8 s in 20 steps
+    assert cue.preview.times[:20] == pytest.approx([0.01 * k for k in range(1, 21)])
+    assert cue.preview.times[20:] == pytest.approx([0.2 + 0.09 * k for k in range(1, 21)])
 
 
 def test_preview_holds_what_the_recording_does_next(drive):
     recording = read_recording(drive)
-    preview = preview_of(recording, recording.samples[2], 1.0)
-    assert [sample[0] for sample in preview.samples] == [7.0, 12.0, 17.0]
+    preview = preview_of(recording, recording.samples[2], 0.2)
+    assert preview.times == pytest.approx([0.01 * k for k in range(1, 18)])
+    # ax grows by 1 with every sample
+    assert [sample[0] for sample in preview.samples] == pytest.approx(list(range(3, 20)))
     assert preview_of(recording, recording.samples[-1], 1.0) is None
     assert preview_of(recording, recording.samples[0], 0.0) is None
 
@@ -228,7 +232,7 @@ def test_what_the_server_recorded_is_sent_on_as_it_was_told(tmp_path):
     assert first.motion.attitude == pytest.approx((0.01, 0.02))
     told = first.driver
     assert (told.throttle, told.brake, told.steering, told.gear) == (0.5, 0.25, -1.5, 3)
-    assert (first.preview.start, first.preview.dt) == pytest.approx((0.1, 0.2))
+    assert first.preview.times == pytest.approx((0.1, 0.3))
     assert first.preview.samples[1] == pytest.approx((4, 5, 6, 0.4, 0.5, 0.6))
     assert cues[1].preview is None
     assert cues[1].driver is None

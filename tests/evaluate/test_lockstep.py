@@ -145,8 +145,10 @@ def test_preview_is_told_ahead_and_ends_with_the_recording():
     ramp = from_samples("ramp", times, force, np.zeros((101, 3)), np.zeros(101))
     thinker = Listener(MACHINE, Tuning(algorithm="classical"), 0.01, MACHINE.parked_pose[None])
     drive(MACHINE, ramp, Tuning(scale=0.5), preview=0.5, thinker=thinker)
-    assert heard[20].times == pytest.approx(np.arange(1, 51) * 0.01)
-    assert heard[20].force[:, 0] == pytest.approx(0.5 * (0.2 + heard[20].times))
+    # what a packet carries: 20 samples every 10 ms, 20 more up to half a second
+    told = np.concatenate((np.arange(1, 21) * 0.01, 0.2 + np.arange(1, 21) * 0.015))
+    assert heard[20].times == pytest.approx(told)
+    assert heard[20].force[:, 0] == pytest.approx(0.5 * (0.2 + told))
     assert len(heard[80].times) == 20
     assert heard[100] is None
 

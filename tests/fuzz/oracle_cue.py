@@ -67,12 +67,15 @@ def read_cue(data, key):
     read.zero([integer(data, 10, 2) & ~31])
     if mode > 3:
         read.wrongs.add("unknown_value")
-    found = _blocks(read, data, {1: _motion, 2: _preview, 3: _driver})
+    found = _blocks(read, data, {1: _motion, 2: _preview, 3: _driver, 4: _timed_preview})
     if found is None:
         return read
     if 1 not in found and mode != 3:
         read.wrongs.add("block_missing")
-    read.plain = read.plain and found == sorted(found)
+    # a sender writes motion, one preview, driver inputs; minor 1 only with a timed preview
+    order = sorted(found, key=[1, 2, 4, 3].index)
+    read.plain = read.plain and found == order and not {2, 4} <= set(found)
+    read.plain = read.plain and data[5] == (1 if 4 in found else 0)
     return read
 
 
@@ -81,9 +84,12 @@ def read_status(data, key):
     if read.wrongs:
         return read
     read.zero(data[10:13])
-    found = _blocks(read, data, {64: _state})
-    if found is not None and not found:
+    found = _blocks(read, data, {64: _state, 65: _notice})
+    if found is not None and 64 not in found:
         read.wrongs.add("block_missing")
+    # a server writes the state first; minor 1 only with a notice
+    read.plain = read.plain and found == sorted(found or ())
+    read.plain = read.plain and data[5] == (1 if 65 in (found or ()) else 0)
     return read
 
 
@@ -94,7 +100,7 @@ def _frame(data, key, magic, text):
     if wrong:
         read.wrongs.add(wrong)
         return read
-    read.zero([data[5], data[7], *data[13:16]])
+    read.zero([data[7], *data[13:16]])
     for name, at, size in (
         ("session", 16, 4),
         ("sequence", 20, 4),
@@ -183,15 +189,36 @@ def _preview(read, body):
     if not 1 <= count <= 40 or len(body) != 12 + 24 * count:
         read.wrongs.add("block_length")
         return
-    samples = tuple(
+    read.zero(body[2:4])
+    samples = _samples(read, body, 12, count, "preview")
+    if "times" not in read.fields:
+        read.fields |= {"dt": dt, "start": start, "samples": samples}
+
+
+def _samples(read, body, begin, count, block):
+    return tuple(
         tuple(
-            read.number(f"preview[{i}].{name}", body, 12 + 24 * i + 4 * j)
+            read.number(f"{block}[{i}].{name}", body, begin + 24 * i + 4 * j)
             for j, name in enumerate(SAMPLE)
         )
         for i in range(count)
     )
-    read.fields |= {"dt": dt, "start": start, "samples": samples}
+
+
+def _timed_preview(read, body):
+    """Of two previews this one counts."""
+    count = integer(body, 0, 2)
+    if len(body) < 4 or not 1 <= count <= 40 or len(body) != 4 + 26 * count:
+        read.wrongs.add("block_length")
+        return
     read.zero(body[2:4])
+    samples = _samples(read, body, 4, count, "timed_preview")
+    instants = [integer(body, 4 + 24 * count + 2 * i, 2) for i in range(count)]
+    if instants != sorted(set(instants)) or instants[-1] > 40000:
+        read.wrongs.add("unknown_value")
+    for name in ("dt", "start"):
+        read.fields.pop(name, None)
+    read.fields |= {"times": tuple(one * 1e-4 for one in instants), "samples": samples}
 
 
 def _driver(read, body):
@@ -202,6 +229,25 @@ def _driver(read, body):
         read.fields[name] = read.number(f"driver.{name}", body, 4 * i)
     read.fields["gear"] = int.from_bytes(body[16:17], "little", signed=True)
     read.zero(body[17:20])
+
+
+def _notice(read, body):
+    if not 4 <= len(body) <= 244:
+        read.wrongs.add("block_length")
+        return
+    kinds, text = integer(body, 0, 2), bytes(body[4:])
+    read.zero(body[2:4])
+    # an empty notice is none, and what is no UTF-8 is not written as it was read
+    read.plain = read.plain and bool(kinds or text) and _is_utf8(text)
+    read.fields |= {"notices": kinds, "notice_text": text.decode("utf-8", "replace")}
+
+
+def _is_utf8(text):
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError:
+        return False
+    return True
 
 
 def _state(read, body):

@@ -11,6 +11,7 @@ from motion_protocol import (
     Motion,
     Preview,
     ProtocolError,
+    TimedPreview,
     decode_cue,
     encode_cue,
 )
@@ -35,6 +36,9 @@ def encode(data):
     )
     samples = (values[0:6],) * (data[120] % 43)
     preview = Preview(values[10], values[11], samples) if choice & 16 else None
+    if preview is not None and data[121] % 2:
+        instants = tuple(values[10] + k * values[11] for k in range(len(samples)))
+        preview = TimedPreview(instants, samples)
     gear = data[1] if choice & 64 else 1
     driver = DriverInputs(*values[12:16], gear) if choice & 32 else None
     session, sequence = _integer(data[1:6]), _integer(data[9:14])
@@ -47,8 +51,10 @@ def encode(data):
     if told is not None:
         used += [*values[0:6], *(values[6:8] if choice & 4 else ()), values[8]]
         used += () if choice & 8 else values[9:10]
+    if isinstance(preview, TimedPreview):
+        right = right and _may_be_sent(preview.times)
     if preview is not None:
-        used += values[10:12]
+        used += values[10:12] if isinstance(preview, Preview) else ()
         right = right and 1 <= len(samples) <= 40
         used += values[0:6] if samples else ()
     if driver is not None:
@@ -66,6 +72,14 @@ def encode(data):
     assert not read_cue(packet, key).wrongs
     assert encode_cue(decode_cue(packet, key), key) == packet, "read and written again it differs"
     return True
+
+
+def _may_be_sent(instants):
+    """As the byte table says: increasing tenths of a millisecond from 0 to 40000."""
+    if not all(math.isfinite(one) and abs(one) < 1e9 for one in instants):
+        return False
+    units = [round(one * 1e4) for one in instants]
+    return units == sorted(set(units)) and all(0 <= one <= 40000 for one in units)
 
 
 def _integer(data):

@@ -29,6 +29,7 @@ OFFSETS = {
         44,
     ),
     "preview": ("count 0 dt 4 start 8", 12),
+    "timed_preview": ("count 0 reserved 2", 4),
     "driver": ("throttle 0 brake 4 clutch 8 steering 12 gear 16", 20),
     "status": (
         "echo_sender_time_ns 0 receive_time_ns 8 echo_sequence 16 accepted_sequence 20 "

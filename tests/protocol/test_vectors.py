@@ -18,6 +18,7 @@ from motion_protocol import (
     ProtocolError,
     Reference,
     Status,
+    TimedPreview,
     decode_cue,
     decode_status,
     encode_cue,
@@ -44,6 +45,14 @@ FULL = Cue(
     driver=DriverInputs(0.75, 0.0, 1.0, -1.5, -1),
     **HEADER,
 )
+TIMED = TimedPreview(
+    (0.01, 0.02, 0.2),
+    (
+        (1.0, -2.0, 0.5, 0.0, 0.0, 0.25),
+        (1.5, -1.0, -0.5, 0.125, -0.5, 0.5),
+        (2.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    ),
+)
 MEANT = {
     "cue_minimal": Cue(sequence=1, motion=PLAIN, **HEADER),
     "cue_full": FULL,
@@ -58,13 +67,15 @@ MEANT = {
         **HEADER,
     ),
     "cue_newer_minor": Cue(sequence=1, motion=PLAIN, **HEADER),
+    "cue_timed_preview": Cue(sequence=1, motion=PLAIN, preview=TIMED, **HEADER),
+    "cue_both_previews": Cue(sequence=1, motion=PLAIN, preview=TIMED, **HEADER),
     "status_run": STATUS,
     "status_signed": replace(STATUS, state=PlatformState.SAFE),
     "status_notice": replace(
         STATUS, notices=Notices.TOO_SLOW | Notices.SENDER_TIME, notice_text="2 Hz: too slow \u2713"
     ),
 }
-REWRITTEN = sorted(MEANT.keys() - {"cue_newer_minor"})
+REWRITTEN = sorted(MEANT.keys() - {"cue_newer_minor", "cue_both_previews"})
 
 
 def name_of(vector):

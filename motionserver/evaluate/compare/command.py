@@ -144,8 +144,8 @@ def _footer(
     told = next((c.preview for c in entered if c.way == "preview"), None)
     if told is not None:
         out.append(
-            f"told {told:g} s ahead: the recording itself as preview, an upper bound that a "
-            "simulator without preview does not reach."
+            f"told {told:g} s ahead: the recording itself as preview, as closely as one packet "
+            "carries it, an upper bound that a simulator without preview does not reach."
         )
     trouble = next((c.disturbance for c in entered if c.disturbance is not None), None)
     if trouble is not None:

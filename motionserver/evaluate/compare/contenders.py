@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import motion_clients
 import numpy as np
+from motion_protocol import preview_times
 
 import motionserver
 from motionserver.core.limits import Machine
@@ -106,7 +107,8 @@ class Task:
             hashlib.sha256(self.recording.read_bytes()).hexdigest(),
             contender.name,
             repr(sorted(tuning.items())),
-            repr((contender.preview, contender.disturbance, self.rate, self.planner_hz)),
+            repr((preview_times(contender.preview), contender.disturbance)),
+            repr((self.rate, self.planner_hz)),
             self.machine.digest,
             _code(contender.name in RIVALS),
         ]
