@@ -79,6 +79,13 @@ def read_recording(path: str | Path) -> Recording:
     """
     table = read_table(Path(path), (*COLUMNS, *FORCE))
     is_own = table.has(*OWN)
+    if is_own and not table.has("t"):
+        raise RecordingError(
+            table.path,
+            "holds what the platform did and not what the vehicle did: written by an earlier "
+            "version of `motionserver record`; record again",
+            line=table.header_line,
+        )
     all_rows = table.rows
     if is_own and table.is_cut and all_rows and len(all_rows[-1][1]) != len(table.names):
         # cut off by a full disk or a power cut

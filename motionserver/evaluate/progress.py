@@ -16,6 +16,8 @@ _EVERY: Final = 10.0
 _EVERY_ON_TERMINAL: Final = 0.5
 _SOONEST: Final = 1.0
 """A rate measured over less says nothing [s]."""
+_LEAST: Final = 0.002
+"""Nor one measured over a smaller share of the work."""
 
 
 class Progress:
@@ -90,7 +92,7 @@ class Progress:
     def _left(self, now: float) -> float | None:
         """Time until all is done, by the rate until now [s]; None while that says nothing."""
         elapsed = self._changed - self._begun
-        if elapsed < _SOONEST or self._done <= 0.0:
+        if elapsed < _SOONEST or self._done < _LEAST * self._total:
             return None
         whole = elapsed / self._done * (self._total - self._done)
         return max(0.0, whole - (now - self._changed))

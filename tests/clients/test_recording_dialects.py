@@ -258,3 +258,9 @@ def test_what_is_no_file_of_bounded_size_is_refused(tmp_path):
     path = drive(tmp_path, table(rows_of()))
     with pytest.raises(RecordingError, match="cut the drive"):
         csv_text.read_text(path, 10)
+
+
+def test_what_an_earlier_version_recorded_says_that_it_holds_no_drive(tmp_path):
+    path = drive(tmp_path, "time_s,state,surge_m,algorithm\n0.0,RUN,0.0,mpc\n0.1,RUN,0.0,mpc\n")
+    with pytest.raises(RecordingError, match="earlier version of `motionserver record`"):
+        read_recording(path)

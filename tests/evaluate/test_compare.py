@@ -15,6 +15,7 @@ from motionserver.evaluate.compare import command, run
 from motionserver.evaluate.compare.command import compare
 from motionserver.evaluate.compare.contenders import Task, contenders
 from motionserver.evaluate.compare.table import COLUMNS, RATIO, Block, Line, blocks
+from motionserver.evaluate.compare.worker_share import forget_share, share_of, tell_share
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.options import EvaluateOptions
 from motionserver.settings.machine import load_machine
@@ -221,3 +222,15 @@ def test_wrong_arguments_are_refused(change, message, folder, tmp_path):
     place = folder if change else Path(tmp_path)
     with pytest.raises(ConfigError, match=message):
         compare(place, tmp_path, replace(OPTIONS, **change))
+
+
+def test_workers_tell_how_far_they_are(tmp_path):
+    file = tmp_path / "abc.json"
+    assert share_of(file) == 0.0
+    for told, heard in ((0.25, 0.25), (7.0, 1.0)):
+        tell_share(file, told)
+        assert share_of(file) == heard
+    (tmp_path / "abc.share").write_text("half")
+    assert share_of(file) == 0.0
+    forget_share(file)
+    assert not list(tmp_path.iterdir())

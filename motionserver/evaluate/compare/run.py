@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Final
@@ -15,6 +16,7 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.evaluate.compare.contenders import Task
+from motionserver.evaluate.compare.worker_share import forget_share, share_of, tell_share
 from motionserver.evaluate.drive import Drive, no_motion
 from motionserver.evaluate.hindsight import find_hindsight
 from motionserver.evaluate.lockstep import drive
@@ -97,7 +99,9 @@ def run_tasks(
                 task = replace(tasks[index], gain=gains.of(index))
                 future = pool.submit(_guarded, task, files[index])
                 running[future] = index
-            progress.at(finished, ", ".join(tasks[index].name for index in running.values()))
+            under_way = sum(sizes[index] * share_of(files[index]) for index in running.values())
+            names = ", ".join(tasks[index].name for index in running.values())
+            progress.at(finished + under_way, names)
             for future in wait(running, _LOOK, return_when=FIRST_COMPLETED).done:
                 take(running.pop(future), *future.result())
     progress.close()
@@ -198,10 +202,14 @@ def drive_task(task: Task) -> Result:
 
 def _guarded(task: Task, file: Path) -> tuple[Result | None, str]:
     try:
+        if task.share is None:
+            task = replace(task, share=partial(tell_share, file))
         result = drive_task(task)
     except Exception as error:
         # one drive that fails must not take hours of others with it
         return None, f"{type(error).__name__}: {error}"
+    finally:
+        forget_share(file)
     scratch = file.with_suffix(f".{os.getpid()}.tmp")
     scratch.write_text(json.dumps(result, allow_nan=False), encoding="utf-8")
     scratch.replace(file)
