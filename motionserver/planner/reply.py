@@ -11,7 +11,7 @@ from motion_protocol import PlatformState as WireState
 from motionserver.core.intake.gate import Gate
 from motionserver.core.safety.states import State
 from motionserver.core.state import VehicleMotion
-from motionserver.planner.inputs import Inputs, is_there
+from motionserver.planner.inputs import Inputs
 from motionserver.planner.source_notices import Notice, spoken
 from motionserver.telemetry.link import STATES
 from motionserver.telemetry.ticker import now_ns
@@ -50,7 +50,9 @@ class StatusSender:
         if now - self._sent_ns < STATUS_NS:
             return
         refused = inputs.out_of_range
-        has_owner = is_there(inputs.vehicle, now)
+        # an owner that says bye again and again is answered, and sees the platform park
+        gate = inputs.vehicle
+        has_owner = gate.owner is not None and not gate.is_silent(now)
         if has_owner:
             echo, source, address, key = newest, None, "", inputs.owner_key
         elif refused is not None and now - refused.arrival_ns <= REFUSED_NS:
@@ -62,7 +64,7 @@ class StatusSender:
             return
         self._sent_ns = now
         told = State.OFFLINE if state is None else state
-        packet = status_packet(inputs.vehicle, inputs.counters, echo, told, scale, notices)
+        packet = status_packet(gate, inputs.counters, echo, told, scale, notices)
         data = encode_status(packet, key)
         if source is None:
             inputs.reply(data)

@@ -9,6 +9,7 @@ from motion_protocol import (
     NOTICE_TEXT_MAX,
     Cue,
     Flags,
+    Mode,
     Motion,
     Notices,
     decode_status,
@@ -199,6 +200,16 @@ def test_answers_come_ten_times_a_second_and_end_with_the_client() -> None:
     assert scene.answer() is not None
     scene.now += 200 * MS
     assert scene.answer() is None
+
+
+def test_a_client_that_says_bye_sees_the_platform_park() -> None:
+    scene = Scene()
+    scene.cue()
+    for _ in range(30):
+        scene.cue(None, mode=Mode.BYE)
+        scene.answer()
+    scene.now += 100 * MS
+    assert scene.answer().state.name == "PARKED"
 
 
 def test_a_format_without_times_is_not_answered() -> None:
