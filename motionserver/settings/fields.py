@@ -143,7 +143,7 @@ def allowed_range(item: FieldInfo, limit: Range | None) -> str:
     low, high, choices = bounds(item, limit)
     if choices:
         return " or ".join(str(c).lower() if isinstance(c, bool) else str(c) for c in choices)
-    return f"{low:g} to {high:g} {_extra(item)['unit']}".rstrip()
+    return f"{low:g} to {high:g} {_extra(item).get('unit', '')}".rstrip()
 
 
 def described(

@@ -181,16 +181,24 @@ def apply_changes(model: TuningModel, changes: dict[str, object]) -> TuningModel
     return taken.with_options(kept)
 
 
-def readable(values: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+def readable(
+    values: dict[str, Any], *, drop_unknown: bool = False
+) -> tuple[dict[str, Any], list[str]]:
     """Values of a file of an earlier version, without what does not exist any more.
+
+    Args:
+        values: What the file holds.
+        drop_unknown: True: leave out what is not known at all, as of a plug-in that is gone.
 
     Returns:
         What is left, and a sentence for each that was left out.
     """
     known = TuningModel.model_fields.keys() | option_fields().keys()
-    gone = [name for name in values if name in REMOVED and name not in known]
+    gone = {name: REMOVED[name] for name in values if name in REMOVED}
+    if drop_unknown:
+        gone |= {n: "not known here (any more)" for n in values.keys() - known - gone.keys()}
     rest = {name: value for name, value in values.items() if name not in gone}
-    return rest, [f"{name} is {REMOVED[name]}" for name in gone]
+    return rest, [f"{name} is left out: {why}" for name, why in sorted(gone.items())]
 
 
 def _validated(values: dict[str, object]) -> TuningModel:

@@ -169,7 +169,7 @@ class TuningBook:
         if type(version) is not int or not isinstance(values, dict) or not isinstance(former, list):
             what = FieldError("tuning", None, "version, values and former", "not a tuning book")
             raise TuningError([what])
-        kept, warnings = readable(values)
+        kept, warnings = readable(values, drop_unknown=True)
         book = cls(machine, now, apply_changes(default_for(machine), kept), prepare)
         book.version = version
         book.warnings = warnings
@@ -184,7 +184,7 @@ class TuningBook:
         inner = entry.get("values")
         values, has_worked = (inner, entry.get("worked") is True) if inner else (entry, False)
         try:
-            model = apply_changes(self._default, readable(dict(values))[0])
+            model = apply_changes(self._default, readable(dict(values), drop_unknown=True)[0])
             model.check_machine(self._machine)
         except (TuningError, TypeError, ValueError) as error:
             self.warnings.append(f"an earlier tuning is dropped from the history: {error}"[:300])

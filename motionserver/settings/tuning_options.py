@@ -15,10 +15,11 @@ from motionserver.settings.fields import FieldError, TuningError, allowed_range,
 
 
 def option_models() -> dict[str, type[BaseModel]]:
-    """The option model of every algorithm that has one; a broken plug-in has none."""
+    """The option model of every algorithm that has one; of a plug-in that is unusable, none."""
     found = {}
     for name in algorithms():
         try:
+            check_options(name)
             model = options_of(name)
         except TunableError:
             continue

@@ -18,6 +18,7 @@ PERIOD: Final = 0.5
 _TOLD: Final = re.compile(r"-> (RAISING|PARKING|FAULT|SAFE):|an operator|the guard before|leaving")
 """Events of the guard that somebody caused or must know of; not that a source comes and goes."""
 _LONGEST: Final = 200
+_LONGEST_CAUSE: Final = 500
 
 _log = logging.getLogger(__name__)
 
@@ -38,6 +39,7 @@ class Watch:
         self._budget = Budget(30, 60.0, now)
         self._client: dict[str, Any] | None = None
         self._guard: int | None = None
+        self._fallback = ""
         self._seen_ns: int | None = None
 
     async def run(self) -> None:
@@ -54,6 +56,7 @@ class Watch:
         """Compare with the last look; the first one only remembers."""
         data = self._board.current().data
         self._look_at_client(data.get("planner") or {})
+        self._look_at_tuning(data.get("planner") or {})
         if data["processes"]["guard"]["alive"]:
             self._look_at_guard(data.get("guard") or {})
 
@@ -65,6 +68,18 @@ class Watch:
         if client != self._client:
             self._write({"action": "client takeover", "old": self._client, "new": client})
             self._client = client
+
+    def _look_at_tuning(self, planner: Mapping[str, Any]) -> None:
+        """A planner that took another tuning at its start than the one kept; also at first sight.
+
+        It falls back before anybody could have looked.
+        """
+        tuning = planner.get("tuning") or {}
+        fallback = str(tuning.get("fallback") or "")[:_LONGEST_CAUSE]
+        if fallback and fallback != self._fallback:
+            version = tuning.get("version")
+            self._write({"action": "tuning fallback", "text": fallback, "version": version})
+        self._fallback = fallback
 
     def _look_at_guard(self, guard: Mapping[str, Any]) -> None:
         pid = guard.get("pid")

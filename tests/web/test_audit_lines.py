@@ -56,7 +56,7 @@ def test_a_change_that_was_refused_tells_what_was_asked_and_changes_nothing(worl
     assert answer.status_code == 412
     assert (last(world)["result"], last(world)["asked"]) == ("stale", {"scale": 0.4})
     assert "changes" not in last(world)
-    assert tuner.post("/api/tuning/undo", headers=tag(world)).status_code == 422
+    assert tuner.post("/api/tuning/undo", headers=tag(world)).status_code == 409
     assert "changes" not in last(world)
 
 
@@ -262,3 +262,15 @@ def test_a_writer_that_holds_the_lock_costs_lines_and_no_time(tmp_path):
     assert audit.lost == 1
     audit.note("park", CALLER, "done")
     assert len(lines(path)) == 1
+
+
+def test_a_fallback_of_the_tuning_is_written_down_once(world):
+    seen = Seen(world)
+    assert seen.look() == []
+    seen.planner["tuning"] = {"version": 8, "fallback": "Version 7 of the tuning cannot be used."}
+    (line,) = seen.look()
+    assert (line["action"], line["version"]) == ("tuning fallback", 8)
+    assert "Version 7" in line["text"]
+    assert seen.look() == []
+    seen.planner["tuning"] = {"version": 9, "fallback": ""}
+    assert seen.look() == []
