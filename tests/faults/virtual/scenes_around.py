@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import stated
 from scenario import TICK, Fault, stale
 
 from motionserver.errors import ConfigError
@@ -41,7 +42,7 @@ class F18(Unseen):
 class F26(Unseen):
     number = 26
     title = "the page crashes or hangs"
-    detection = "its end; no sign of life for 10 s"
+    detection = stated.NO_SIGN
     reaction = "none; the service starts another"
     recovery = "none needed"
 
@@ -54,7 +55,7 @@ class F26(Unseen):
 class F27(Unseen):
     number = 27
     title = "flood of requests, and what it lets through"
-    detection = "eight requests per tick, the queue's own bound"
+    detection = stated.REQUESTS_READ
     reaction = "none; every request answered or dropped"
     recovery = "none needed"
 

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+import stated
 from client import Client
 from scenario import TICK, Fault, stale
 
@@ -64,10 +65,9 @@ class F1(Silence):
     title = "client silent"
     detection = "age of the newest packet > max(50 ms, 3 T)"
     reaction = (
-        "HOLD, fade 0.3 s; PARKING after 2 s, of a format that pauses by silence (BeamNG) after "
-        "10 min"
+        f"{stated.FADE_AND_PARK}, of a format that pauses by silence (BeamNG) after {stated.PAUSED}"
     )
-    recovery = "fresh for 0.5 s: RUN; parked: a new engage"
+    recovery = stated.FRESH
 
     def __init__(self, world, rng):
         super().__init__(world, rng)
@@ -142,6 +142,7 @@ class F32(F1):
     number = 32
     title = "Zenoh router restarts, network is parted"
     detection = "age of the newest packet, never Zenoh's liveliness"
+    reaction = stated.FADE_AND_PARK
     setup: ClassVar[dict] = {"kind": "zenoh"}
 
     def strike(self):

@@ -6,6 +6,7 @@ import zlib
 from dataclasses import replace
 from typing import ClassVar
 
+import stated
 from motion_protocol import Flags, Mode, encode_cue
 from motion_protocol.cue import CUE_LAYOUT
 from scenario import TICK, stale
@@ -31,7 +32,7 @@ class F2(ClientFault):
     number = 2
     title = "NaN, inf, denormal numbers"
     detection = "isfinite of every field; share of bad packets over 1 s"
-    reaction = "packet dropped and counted; more than 10 % over 1 s: HOLD"
+    reaction = stated.BAD_SHARE
     recovery = "automatic"
     counter = "refused_not_finite"
 
@@ -215,7 +216,7 @@ class F8(ClientFault):
 class F9(ClientFault):
     number = 9
     title = "flood of 100,000 packets a second"
-    detection = "at most 64 datagrams are read per period"
+    detection = stated.FLOOD
     reaction = "the guard does not notice; the own client may starve: as F1"
     recovery = "automatic"
     counter = "refused"

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import stated
 from fittings import NOWHERE
 from machines import compact
 from scenario import SEND, TICK, Fault
@@ -37,7 +38,7 @@ class F14(NoPlan):
     number = 14
     title = "the problem has no solution"
     detection = "solver's status"
-    reaction = "the accepted plan plays to rest; after 3 periods HOLD, then PARKING"
+    reaction = stated.NO_SOLUTION
     recovery = "automatic"
 
     def __init__(self, world, rng):
@@ -131,9 +132,9 @@ class F16(Fault):
 class F21(NoPlan):
     number = 21
     title = "planner crashes, is killed or stands still"
-    detection = "no new plan for 3 periods"
-    reaction = "HOLD, the accepted plan to rest, PARKING after 2 s"
-    recovery = "another planner once parked; for one that stands still after 10 s"
+    detection = stated.NO_PLAN
+    reaction = stated.TO_REST
+    recovery = stated.REPLACED
 
     def __init__(self, world, rng):
         super().__init__(world, rng)
@@ -150,7 +151,7 @@ class F21(NoPlan):
 class F28(Fault):
     number = 28
     title = "bad tuning: out of range, NaN, half, flapping"
-    detection = "bounds of every field, version, two changes a second"
+    detection = stated.CHANGES
     reaction = "refused with the reason, the last good stays; what is good is ramped"
     recovery = "undo"
     stays = True

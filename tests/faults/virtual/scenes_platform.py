@@ -3,6 +3,7 @@
 import struct
 
 import numpy as np
+import stated
 from fittings import BASE
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.moog_wire import Fault as Bit
@@ -59,7 +60,7 @@ class Astray(PlatformFault):
 class F10(PlatformFault):
     number = 10
     title = "platform silent"
-    detection = "age of the newest answer > max(100 ms, 6 T)"
+    detection = stated.SILENT_BASE
     reaction = "FAULT: the accepted plan plays to rest, packets go on"
     recovery = "an operator's reset"
 
@@ -159,7 +160,7 @@ class F12(Fault):
 class F13(Astray):
     number = 13
     title = "platform does not follow"
-    detection = "difference to the command > 10 mm + 0.15 s x leg speed for 100 ms"
+    detection = stated.ASTRAY
     reaction = "FAULT: the accepted plan plays to rest"
     recovery = "an operator's reset"
 
@@ -188,7 +189,7 @@ class F13(Astray):
 class F25(Fault):
     number = 25
     title = "no answer at the start"
-    detection = "no valid answer for 0.3 s"
+    detection = stated.NO_ANSWER
     reaction = "OFFLINE; only the mode word is sent, which moves nothing; no engaging"
     recovery = "it answers: PARKED"
     from_start = True

@@ -1,5 +1,6 @@
 """Faults of the guard's own process and of its time: F17, F19, F20, F22 to F24."""
 
+import stated
 from fittings import Slot
 from scenario import SEND, TICK, Fault
 
@@ -12,7 +13,7 @@ class F17(Fault):
     number = 17
     title = "a tick comes too late"
     detection = "gap of the guard's own loop"
-    reaction = "slots are skipped, the plan's clock pauses; a gap above 0.3 s: HOLD"
+    reaction = stated.GAP
     recovery = "automatic"
 
     def __init__(self, world, rng):
@@ -42,7 +43,7 @@ class F19(Fault):
     number = 19
     title = "suspend, SIGSTOP, pause of the virtual machine"
     detection = "gap of the guard's own loop; the base's own word"
-    reaction = "the plan's clock pauses; above 0.3 s HOLD; the base reports its loss: FAULT"
+    reaction = stated.SUSPENDED
     recovery = "automatic, or an operator's reset"
 
     def __init__(self, world, rng):
