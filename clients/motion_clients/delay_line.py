@@ -6,6 +6,7 @@ import heapq
 from dataclasses import dataclass
 from typing import Final
 
+from .datagram import own_bytes
 from .flawed_link import FlawedLink, LinkCounts, LinkFlaws
 
 MOST_HELD: Final = 4096
@@ -72,7 +73,8 @@ class DelayLine:
             if len(self._held) >= MOST_HELD or self._bytes + size > MOST_BYTES:
                 self.counts.dropped += 1
                 continue
-            heapq.heappush(self._held, (now + arrival.delay, self._order, arrival.datagram))
+            held = own_bytes(arrival.datagram)
+            heapq.heappush(self._held, (now + arrival.delay, self._order, held))
             self._order += 1
             self._bytes += size
 

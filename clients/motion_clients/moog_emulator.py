@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Self
 
 from .arrival_stamps import StampingSocket, bound_socket
+from .datagram import own_bytes
 from .flawed_link import FlawedLink, LinkFlaws
 from .force_sender import ForceSender
 from .moog_config import MoogConfig
@@ -38,6 +39,9 @@ ENDING = tuple(
 """What switches a base off that runs by itself; its verdict is written."""
 
 _TICK = 0.005  # [s], how often the base is advanced while nothing arrives
+
+MOST_HOSTS = 64
+"""Addresses of hosts that are remembered for the verdict."""
 
 
 class Emulator(asyncio.DatagramProtocol):
@@ -166,9 +170,11 @@ class Emulator(asyncio.DatagramProtocol):
         """Take one datagram off the socket."""
         now = time.monotonic()
         arrived_ns = time.monotonic_ns() if self._socket is None else self._socket.arrived_ns
+        data = own_bytes(data)
         if self._log is not None:
             self._log.write(arrived_ns, data)
-        self._hosts.add(addr[:2])
+        if len(self._hosts) < MOST_HOSTS:
+            self._hosts.add(addr[:2])
         self.device.advance(now)
         self.judge.observe(data, arrived_ns * 1e-9, self.device)
         for arrival in self.to_base.carry(now, data):
@@ -276,7 +282,8 @@ def run_emulator(
         return emulator.summary()
 
     with contextlib.ExitStack() as stack:
-        log = stack.enter_context(MotionLog(log_path))
+        # nobody reads what it would keep in memory
+        log = stack.enter_context(MotionLog(log_path, kept=0))
         sender = None
         if force_to is not None:
             sender = stack.enter_context(contextlib.closing(ForceSender(force_to, key=key)))

@@ -19,6 +19,9 @@ from .position_feedback import PositionFeedback
 STEP = 0.002
 """Integration step of the model [s]."""
 
+MOST_TRANSITIONS = 4096
+"""States entered that are remembered: a host may ask for others as often as it likes."""
+
 _HOME_TOLERANCE = 1e-3  # [m], a home switch
 _FAULTED = (MachineState.FAULT1, MachineState.FAULT2, MachineState.FAULT3)
 _RAISED = (MachineState.STANDBY, MachineState.ENGAGED, MachineState.INHIBITED)
@@ -39,7 +42,7 @@ class MoogMachine:
         mode: Command mode in force.
         now: Instant up to which the model has been advanced [s].
         state: Machine state.
-        transitions: Every state entered, with its instant [s].
+        transitions: The newest states entered, with their instants [s].
     """
 
     def __init__(
@@ -273,6 +276,8 @@ class MoogMachine:
     def _enter(self, state: MachineState) -> None:
         self.state = state
         self._entered = self.now
+        if len(self.transitions) >= MOST_TRANSITIONS:
+            del self.transitions[0]
         self.transitions.append((self.now, state))
 
     def _stand(self) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from .datagram import own_bytes
+
 _KEPT = 100_000
 
 
@@ -36,7 +38,7 @@ class MotionLog:
 
     def write(self, instant_ns: int, datagram: bytes) -> None:
         """Add one datagram."""
-        self.records.append((instant_ns, datagram))
+        self.records.append((instant_ns, own_bytes(datagram)))
         if self._file is not None:
             self._file.write(f"{instant_ns} {datagram.hex()}\n")
 

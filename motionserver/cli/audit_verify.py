@@ -7,8 +7,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Final
 
+from motionserver.cli.running import find_folders
 from motionserver.errors import ConfigError
-from motionserver.settings.config import load_config, state_dir_of
 from motionserver.web.audit_chain import Head, Line, read_head, read_lines, rotated, walk
 
 LIMITS: Final = (
@@ -23,14 +23,16 @@ def verify_text(file: Path | None, config: Path | None, noted: str) -> tuple[str
     """What walking the chain finds, for people, and whether it is whole.
 
     Args:
-        file: The log; None for that of a configuration's server.
-        config: The configuration; None for the defaults.
+        file: The log; None for that of a configuration's server, or of the one that runs.
+        config: The configuration; None for the server that runs, or else the default folder.
         noted: A head hash that was noted earlier; "" without.
 
     Raises:
         ConfigError: The log cannot be read.
     """
-    path = state_dir_of(load_config(config)) / "audit.jsonl" if file is None else file
+    if file is None:
+        file = find_folders("audit verify", config).state_dir / "audit.jsonl"
+    path = file
     lines, head, has_older = _read(path)
     found = walk(lines, head, has_older)
     files = Counter(line.file for line in lines)

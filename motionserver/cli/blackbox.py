@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from motionserver.cli.commands import app
+from motionserver.cli.commands import RunDir, app
 
 blackbox_app = typer.Typer(
     no_args_is_help=True, help="The last minute before every fault, from the server's own memory."
@@ -19,11 +19,11 @@ ConfigOption = Annotated[
 
 
 @blackbox_app.command(name="list")
-def list_dumps(config: ConfigOption = None) -> None:
+def list_dumps(config: ConfigOption = None, run_dir: RunDir = None) -> None:
     """List the dumps, oldest first, and what the running server's black box says of itself."""
     from motionserver.cli.blackbox_text import list_text
 
-    typer.echo(list_text(config))
+    typer.echo(list_text(config, run_dir))
 
 
 @blackbox_app.command()
@@ -35,8 +35,9 @@ def show(
     csv_out: Annotated[
         Path | None, typer.Option("--csv", help="write its samples here", metavar="OUT")
     ] = None,
+    run_dir: RunDir = None,
 ) -> None:
     """Say what happened: states with reasons, last plans and packets, rates, counters."""
     from motionserver.cli.blackbox_text import show_text
 
-    typer.echo(show_text(file, config, csv_out))
+    typer.echo(show_text(file, config, csv_out, run_dir))

@@ -6,16 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-from motionserver.settings.config import load_config, run_dir_of, state_dir_of
+from motionserver.cli.running import find_folders
 from motionserver.telemetry.blackbox.dump import dumps
 from motionserver.telemetry.blackbox.reader import DumpError, read_dump, summary, write_csv
 from motionserver.telemetry.mapped import MappedFile
 
 
-def list_text(path: Path | None) -> str:
-    """All dumps of a configuration's server, one a line."""
-    config = load_config(path)
-    folder = state_dir_of(config) / "blackbox"
+def list_text(path: Path | None, run_dir: Path | None = None) -> str:
+    """All dumps of a server, one a line."""
+    server = find_folders("blackbox list", path, run_dir)
+    folder = server.state_dir / "blackbox"
     lines = []
     for dump in dumps(folder):
         try:
@@ -23,24 +23,27 @@ def list_text(path: Path | None) -> str:
         except DumpError as error:
             reasons = str(error)
         lines.append(f"{dump.name}  {dump.stat().st_size / 1e6:.1f} MB  {reasons}")
-    told = box_status(run_dir_of(config))
+    told = box_status(server.run_dir)
     if told is not None and told["failed"]:
         lines.append(f"{told['failed']} dumps could not be written: {told['error']}")
     return "\n".join(lines) or f"{folder}: no dumps"
 
 
-def show_text(which: str, path: Path | None, csv_out: Path | None) -> str:
+def show_text(
+    which: str, path: Path | None, csv_out: Path | None, run_dir: Path | None = None
+) -> str:
     """One dump for people.
 
     Args:
         which: Path, name in the folder, or "latest".
-        path: Configuration; None for the defaults.
+        path: Configuration; None for the server that runs, or else the default folder.
         csv_out: New file for the samples, if wanted.
+        run_dir: Run directory of the server, if several run.
 
     Raises:
         DumpError: There is none, or it cannot be read, or the samples cannot be written.
     """
-    folder = state_dir_of(load_config(path)) / "blackbox"
+    folder = find_folders("blackbox show", path, run_dir).state_dir / "blackbox"
     if which == "latest":
         found = dumps(folder)
         if not found:

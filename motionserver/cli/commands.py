@@ -20,7 +20,14 @@ ConfigFile = Annotated[
     Path | None, typer.Argument(help="configuration, TOML", metavar="CONFIG.toml")
 ]
 MaybeConfig = Annotated[
-    Path | None, typer.Argument(help="configuration of the running server", metavar="CONFIG.toml")
+    Path | None,
+    typer.Argument(
+        help="configuration of the server; the one that runs unless given", metavar="CONFIG.toml"
+    ),
+]
+RunDir = Annotated[
+    Path | None,
+    typer.Option("--run-dir", help="run directory of the server, if several run", metavar="FOLDER"),
 ]
 Seconds = Annotated[float | None, typer.Option("--seconds", help="end by itself", metavar="S")]
 
@@ -92,32 +99,33 @@ def check(
 
 
 @app.command()
-def engage(config: MaybeConfig = None) -> None:
+def engage(config: MaybeConfig = None, run_dir: RunDir = None) -> None:
     """Raise the platform: an operator's edge, given at the console."""
-    _ask("engage", config)
+    _ask("engage", config, run_dir)
 
 
 @app.command()
-def park(config: MaybeConfig = None) -> None:
+def park(config: MaybeConfig = None, run_dir: RunDir = None) -> None:
     """Park the platform, from whatever it does."""
-    _ask("park", config)
+    _ask("park", config, run_dir)
 
 
 @app.command()
-def reset(config: MaybeConfig = None) -> None:
+def reset(config: MaybeConfig = None, run_dir: RunDir = None) -> None:
     """Leave FAULT or SAFE once the cause is gone."""
-    _ask("reset", config)
+    _ask("reset", config, run_dir)
 
 
 @app.command()
 def status(
     config: MaybeConfig = None,
     as_json: Annotated[bool, typer.Option("--json", help="print everything as JSON")] = False,
+    run_dir: RunDir = None,
 ) -> None:
     """Show what a running server does."""
     from motionserver.cli.serving import status_text
 
-    typer.echo(status_text(config, as_json))
+    typer.echo(status_text(config, as_json, run_dir))
 
 
 @app.command()
@@ -127,17 +135,18 @@ def record(
         "drive.csv"
     ),
     seconds: Seconds = None,
+    run_dir: RunDir = None,
 ) -> None:
     """Write what a running server does, one row per packet, without touching it."""
     from motionserver.cli.recording import record as record_drive
 
-    typer.echo(record_drive(config, out, seconds))
+    typer.echo(record_drive(config, out, seconds, run_dir))
 
 
-def _ask(op: str, config: Path | None) -> None:
+def _ask(op: str, config: Path | None, run_dir: Path | None) -> None:
     from motionserver.cli.serving import ask_guard
 
-    answer = ask_guard(op, config)
+    answer = ask_guard(op, config, run_dir)
     granted = "ok" if answer["ok"] else "refused"
     typer.echo(f"{op}: {granted}, state {answer['state']}: {answer['reason']}")
     raise typer.Exit(0 if answer["ok"] else 1)
@@ -164,11 +173,14 @@ def demo(
     json_out: Annotated[
         Path | None, typer.Option("--json", help="write the summary here", metavar="OUT")
     ] = None,
+    open_page: Annotated[bool, typer.Option("--open", help="open the page in the browser")] = False,
 ) -> None:
     """A truck's drive moves a simulated Moog base: no configuration, no root, no hardware."""
     from motionserver.cli.demo import Demo
 
-    raise typer.Exit(Demo(seconds, not no_page, algorithm, fault, recording, json_out).run())
+    raise typer.Exit(
+        Demo(seconds, not no_page, algorithm, fault, recording, json_out, open_page).run()
+    )
 
 
 @app.command()

@@ -11,11 +11,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-from motionserver.cli.serving import NotRunningError
+from motionserver.cli.running import NotRunningError, find_server
 from motionserver.core.limits import machine_from_mapping
 from motionserver.cueing.registry import algorithms
 from motionserver.errors import ConfigError
-from motionserver.settings.config import load_config, run_dir_of
 from motionserver.telemetry.cue_history import CueReader
 from motionserver.telemetry.link import GuardClock, Maps
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
@@ -25,7 +24,7 @@ _POLITE = 10
 """Nice value: whatever is recorded comes first."""
 
 
-def record(path: Path | None, out: Path, seconds: float | None) -> str:
+def record(path: Path | None, out: Path, seconds: float | None, run_dir: Path | None = None) -> str:
     """Record a running server until Ctrl-C, SIGTERM, its end, or for ``seconds`` [s].
 
     Returns:
@@ -37,13 +36,17 @@ def record(path: Path | None, out: Path, seconds: float | None) -> str:
     """
     if seconds is not None and not seconds > 0.0:
         raise ConfigError("--seconds", f"{seconds:g}", "Give a positive number.")
-    run_dir = run_dir_of(load_config(path))
+    run_dir = find_server("record", path, run_dir).run_dir
     try:
         maps = Maps(run_dir)
         shown = json.loads((run_dir / "config.json").read_text("utf-8"))
         clock = maps.clock.read()
     except (OSError, ValueError) as error:
-        raise NotRunningError(f"record: no server runs in {run_dir} ({error})") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise NotRunningError(
+            f"record: the server in {run_dir} cannot be read ({why}); it may be starting or "
+            "ending: try again"
+        ) from error
     if clock is None or now_ns() - GuardClock.unpack(clock[1]).written_ns > SILENT_NS:
         raise NotRunningError(f"record: no server runs in {run_dir}; its guard says nothing")
     over = threading.Event()

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
+import os
+import socket
+import sys
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -12,9 +16,18 @@ from typing import Any
 import numpy as np
 
 from motionserver.cli.blackbox_text import box_status
+from motionserver.cli.page_link import first_start_text
+from motionserver.cli.running import (
+    NotRunningError,
+    Server,
+    announced,
+    find_server,
+    server_of,
+    silence,
+)
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import machine_from_mapping
-from motionserver.errors import MotionServerError
+from motionserver.evaluate.bench.processes import free_port
 from motionserver.settings.config import Config, load_config, run_dir_of
 from motionserver.settings.machine import (
     MachineAsRead,
@@ -29,15 +42,9 @@ from motionserver.supervisor.addresses import try_way
 from motionserver.supervisor.rundir import refuse_foreign
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
-from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.requests import RequestError, ask
 from motionserver.telemetry.signals import PARKING, ignore_signals
-from motionserver.telemetry.ticker import now_ns
 from motionserver.web.config import config_from
-
-
-class NotRunningError(MotionServerError):
-    """No server answers with this configuration."""
 
 
 def serve(path: Path, dry_run: bool) -> int:
@@ -49,10 +56,14 @@ def serve(path: Path, dry_run: bool) -> int:
     )
     log = logging.getLogger("motionserver.supervisor")
     run_dir = run_dir_of(config)
-    service = make_service(config, run_dir, dry_run)
+    resolved = resolve(config, run_dir, dry_run)
+    if config.web.enabled and resolved["web"]["port"] == 0:
+        # chosen here, so that somebody is told which
+        resolved["web"]["port"] = free_port(socket.SOCK_STREAM)
+    service = make_service(config, resolved, run_dir)
     if config.web.enabled:
-        scheme = "https" if config.web.tls_cert else "http"
-        log.info("page %s://%s:%d", scheme, config.web.host, config.web.port)
+        sys.stdout.write(first_start_text(resolved["web"], sys.stdout) + "\n")
+        sys.stdout.flush()
     read = read_machine(config.platform.preset)
     for warning in filter(None, (box_warning(read), *doubts(config, read.machine))):
         log.warning("%s", warning)
@@ -60,12 +71,19 @@ def serve(path: Path, dry_run: bool) -> int:
         log.info("dry run: everything is played, nothing that moves is sent")
     if config.operator.engage == "auto":
         log.warning("engage = auto: the platform RISES BY ITSELF when the first source is fresh")
-    return asyncio.run(service.run())
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(announced(server_of(config, str(path))))
+        except OSError as error:
+            log.warning(
+                "commands without a configuration will not find this server: %s cannot be used "
+                "to announce it (%s)", error.filename, error.strerror,
+            )  # fmt: skip
+        return asyncio.run(service.run())
 
 
-def make_service(config: Config, run_dir: Path, dry_run: bool) -> Service:
-    """The service of a configuration."""
-    resolved = resolve(config, run_dir, dry_run)
+def make_service(config: Config, resolved: dict[str, Any], run_dir: Path) -> Service:
+    """The service of a configuration and of what `settings.resolve` made of it."""
     _check_page(config, resolved)
     local = (config.platform.local_host, config.platform.local_port)
     return Service(resolved, config.web.enabled, local, run_dir)
@@ -133,22 +151,39 @@ def wrapped(lines: list[str]) -> list[str]:
     return [part for line in lines for part in wrap(line, 80, subsequent_indent=" " * 11)]
 
 
-def ask_guard(op: str, path: Path | None) -> dict[str, Any]:
+def ask_guard(op: str, path: Path | None, run_dir: Path | None = None) -> dict[str, Any]:
     """Send an operator's edge over the guard's own socket."""
-    run_dir = run_dir_of(load_config(path))
+    server = find_server(op, path, run_dir)
     try:
-        return ask(run_dir / "guard.sock", {"op": op, "by": "console"}, timeout=2.0)
+        return ask(server.run_dir / "guard.sock", {"op": op, "by": "console"}, timeout=2.0)
     except RequestError as error:
-        raise NotRunningError(f"{op}: {error}") from error
+        raise NotRunningError(f"{op}: {_unanswered(server, error)}") from error
 
 
-def status_text(path: Path | None, as_json: bool) -> str:
+def _unanswered(server: Server, error: RequestError) -> str:
+    """Why a server that runs did not answer, and what to do."""
+    owner = server.run_dir.stat().st_uid if server.run_dir.exists() else os.getuid()
+    if owner != os.getuid():
+        return f"{error}. {server.run_dir} belongs to another user: ask as that user"
+    return (
+        f"{error}. The server in {server.run_dir} is running, but its guard "
+        f"{silence(server) or 'reports and does not answer'}; it may be starting, or the machine "
+        "is overloaded: try again, see `motionserver status` and `motionserver doctor`"
+    )
+
+
+def status_text(path: Path | None, as_json: bool, run_dir: Path | None = None) -> str:
     """What a running server does, for people or as JSON."""
-    run_dir = run_dir_of(load_config(path))
+    server = find_server("status", path, run_dir)
+    run_dir = server.run_dir
     try:
         maps = Maps(run_dir)
     except (OSError, ValueError) as error:
-        raise NotRunningError(f"status: no server runs in {run_dir} ({error})") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise NotRunningError(
+            f"status: the server in {run_dir} cannot be read ({why}); it may be starting or "
+            "ending: try again"
+        ) from error
     parts = {}
     for name, source in (
         ("guard", maps.guard),
@@ -159,16 +194,14 @@ def status_text(path: Path | None, as_json: bool) -> str:
         parts[name] = None if message is None else json.loads(message[1])
     parts["blackbox"] = box = box_status(run_dir)
     guard, planner = parts["guard"], parts["planner"]
-    if guard is not None and (age := now_ns() - guard["t_ns"]) > SILENT_NS:
-        raise NotRunningError(
-            f"status: no server runs in {run_dir}; its last word is {age * 1e-9:.0f} s old: "
-            f"{guard['state']}, {guard['reason']}"
-        )
+    if guard is not None and (problem := silence(server)) is not None:
+        raise NotRunningError(f"status: no server runs in {run_dir}; {problem}")
     if as_json:
         return json.dumps(parts, indent=2)
     if guard is None:
         return "the guard has not shown anything yet"
     lines = [
+        f"server     {server}",
         f"state      {guard['state']}: {guard['reason']}",
         f"pose       {describe_pose(np.array(guard['pose']))}",
         f"device     {guard['feedback']['device_state']}, faults: "

@@ -85,10 +85,15 @@ def ask(path: Path, request: dict[str, Any], timeout: float = 1.0) -> dict[str, 
             link.settimeout(timeout)
             link.sendto(json.dumps(request).encode(), str(path))
             answer = json.loads(link.recv(65536))
-        except (OSError, ValueError) as error:
+        except (FileNotFoundError, ConnectionRefusedError) as error:
             raise RequestError(
-                f"no answer from {path.name} in {timeout:g} s ({error or 'timed out'}); "
-                "is the server running with this configuration?"
+                f"nobody listens at {path}; is the server running with this configuration?"
+            ) from error
+        except (OSError, ValueError) as error:
+            why = (error.strerror if isinstance(error, OSError) else str(error)) or "timed out"
+            raise RequestError(
+                f"no answer from {path.name} in {timeout:g} s ({why}); is the server running with "
+                "this configuration?"
             ) from error
         finally:
             own.unlink(missing_ok=True)

@@ -8,6 +8,16 @@ export function setToken(value) {
   else sessionStorage.removeItem(KEY);
 }
 
+// A link may hand over a token behind "#", which browsers send to nobody. It leaves the address bar
+// and this tab's history before anything else happens.
+export function takeToken() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given === null) return false;
+  history.replaceState(null, "", location.pathname + location.search);
+  setToken(given.trim());
+  return true;
+}
+
 export function headers(more = {}) {
   return token() ? { ...more, Authorization: `Bearer ${token()}` } : more;
 }

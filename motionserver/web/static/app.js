@@ -1,5 +1,5 @@
 // Brings stream, drawings and forms together.
-import { send, sentence, setToken, token } from "./api.js";
+import { send, sentence, setToken, takeToken, token } from "./api.js";
 import { byId, put } from "./dom.js";
 import { Engines } from "./engines.js";
 import { FaultHelp } from "./faulthelp.js";
@@ -12,6 +12,7 @@ import { Stream } from "./stream.js";
 import { Tuning } from "./tuning.js";
 
 const OLD_MS = 1000;
+takeToken();
 const hexapod = new Hexapod(byId("hexapod"));
 const legs = new Legs();
 const plots = new Plots();
@@ -102,10 +103,17 @@ byId("token-form").addEventListener("submit", (event) => {
   event.preventDefault();
   setToken(byId("token").value.trim());
   byId("token").value = "";
+  useToken();
+});
+
+function useToken() {
   byId("token").placeholder = token() ? "token in use" : "access token";
   stream.restart();
   identify();
-});
+}
+
+// a link with a token that is opened in a tab which shows the page already
+addEventListener("hashchange", () => { if (takeToken()) useToken(); });
 
 function render() {
   freshness();
