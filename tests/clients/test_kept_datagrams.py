@@ -6,10 +6,8 @@ shrunk object. So what is told here is that nobody holds the received object its
 """
 
 import asyncio
-import resource
 import sys
 
-import pytest
 from moog_host import frame
 from motion_clients import moog_emulator
 from motion_clients.datagram import own_bytes
@@ -98,28 +96,3 @@ def test_states_entered_again_and_again_are_remembered_up_to_a_bound():
         device._enter((MachineState.STANDBY, MachineState.PARKING)[number % 2])
     assert len(device.transitions) == MOST_TRANSITIONS
     assert device.transitions[-1][1] is MachineState.PARKING
-
-
-@pytest.mark.campaign
-def test_a_hundred_thousand_packets_leave_the_emulator_as_large_as_it_was():
-    """The figure of the complaint: 4 KiB a packet, 400 MB here."""
-
-    async def flood():
-        async with Emulator(log=MotionLog()) as emulator:
-            loop = asyncio.get_running_loop()
-            host, _ = await loop.create_datagram_endpoint(
-                asyncio.DatagramProtocol, remote_addr=emulator.address
-            )
-            data = received()
-            before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-            while emulator.summary()["packets"] < 100_000:
-                for _ in range(100):
-                    host.sendto(data)
-                await asyncio.sleep(0)
-            host.close()
-            await asyncio.sleep(0.01)
-            return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-
-    grown = asyncio.run(flood())
-    print(f"grew by {grown / 1e3:.1f} MB over 100,000 packets")
-    assert grown < 100_000
