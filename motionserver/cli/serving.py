@@ -201,7 +201,6 @@ def status_text(path: Path | None, as_json: bool, run_dir: Path | None = None) -
     if guard is None:
         return "the guard has not shown anything yet"
     lines = [
-        f"server     {server}",
         f"state      {guard['state']}: {guard['reason']}",
         f"pose       {describe_pose(np.array(guard['pose']))}",
         f"device     {guard['feedback']['device_state']}, faults: "
@@ -223,6 +222,7 @@ def status_text(path: Path | None, as_json: bool, run_dir: Path | None = None) -
     if box is not None:
         failed = f", {box['failed']} not written: {box['error']}" if box["failed"] else ""
         lines.append(f"black box  {box['dumps']} dumps since the start{failed}")
+    lines.append(f"server     {server}")
     return "\n".join(lines)
 
 

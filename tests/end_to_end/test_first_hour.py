@@ -173,7 +173,7 @@ def test_run_prints_a_link_at_its_first_start_only(tmp_path, started):
     url, token = LINK.search(first.text).groups()
     until(lambda: answers(url), "the page to answer")
     assert role_of(url, token) == "operator"
-    assert process("status").stdout.splitlines()[0].endswith(f"({path})")
+    assert process("status").stdout.splitlines()[-1].endswith(f"({path})")
     first.end(signal.SIGTERM)
     second = started("run", str(path))
     second.expect(rf"page http://127\.0\.0\.1:\d+, tokens in {tmp_path}/state/tokens\.json")
