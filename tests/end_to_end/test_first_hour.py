@@ -108,6 +108,7 @@ def test_the_demo_gives_a_link_answers_commands_and_survives_a_fault(tmp_path, s
     browser.chmod(0o755)
     demo = started("demo", "--open", BROWSER=str(browser))
     demo.expect(LINK.pattern)
+    demo.expect("loading guard")
     url, token = LINK.search(demo.text).groups()
     # not after a wait that may end before the page has made its tokens
     assert demo.text.index("#token=") < demo.text.index(" s  ")
