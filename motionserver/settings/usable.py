@@ -144,7 +144,8 @@ def _check_sources(sources: list[SourceSection]) -> None:
         where = f"[[sources]] {source.kind} {source.listen}"
         if source.kind != "zenoh":
             for key in ("topic", "connect"):
-                if key in source.model_fields_set and getattr(source, key):
+                # the default written out, as in the annotated file, asks for nothing
+                if getattr(source, key) not in ("", [], SourceSection.model_fields[key].default):
                     raise ConfigError(
                         f"{where}: {key}",
                         'would do nothing: it needs kind = "zenoh"',
