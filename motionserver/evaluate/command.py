@@ -19,7 +19,7 @@ from motionserver.evaluate.lockstep import PLANNER_HZ, drive
 from motionserver.evaluate.metrics.figures import figures_of
 from motionserver.evaluate.page import to_html
 from motionserver.evaluate.progress import WEIGHTS, Progress
-from motionserver.evaluate.ranges import check_algorithms, check_scale, check_times
+from motionserver.evaluate.ranges import check_algorithms, check_made, check_scale, check_times
 from motionserver.evaluate.recording import Recording, read_all
 from motionserver.evaluate.result import EvaluateResult, to_json
 from motionserver.evaluate.setpoints import write_setpoints
@@ -83,6 +83,7 @@ def evaluate(
     check_algorithms(algorithms)
     check_scale(base.scale)
     check_times(rate, planner_hz, preview)
+    check_made(machine, base, algorithms, planner_hz)
     if setpoints is not None and len(algorithms) != 1:
         raise ConfigError(
             "--setpoints",

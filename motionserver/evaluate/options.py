@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from dataclasses import dataclass, replace
 from math import isfinite, radians
@@ -22,7 +23,7 @@ from motionserver.evaluate.lockstep import PLANNER_HZ
 from motionserver.evaluate.ranges import check_scale, check_times
 from motionserver.settings.fields import TuningError
 from motionserver.settings.machine import load_machine
-from motionserver.settings.tuning import apply_changes, default_for
+from motionserver.settings.tuning import apply_changes, default_for, readable
 from motionserver.settings.tuning_presets import NAME, PresetShelf
 
 FREE_DEG_S: Final = 1000.0
@@ -189,6 +190,9 @@ def _tuning(
                 f"Allowed: {', '.join(MODELS)}; what comes ahead is told by --preview.",
             )
         values = {**values, "reference": reference}
+    values, left_out = readable(values)
+    for warning in left_out:
+        print(f"{where}: {warning}", file=sys.stderr)  # noqa: T201
     try:
         model = apply_changes(default_for(machine), values)
         model.check_machine(machine)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
+from motionserver.core.limits import Machine
 from motionserver.cueing.registry import algorithms as known_algorithms
-from motionserver.errors import ConfigError
+from motionserver.cueing.think import prepare
+from motionserver.cueing.tuning import Tuning
+from motionserver.errors import ConfigError, TunableError
 from motionserver.evaluate.hearing import LONGEST_PREVIEW
 
 PLANNER_RATES_HZ: Final = (20.0, 250.0)
@@ -33,6 +37,21 @@ def check_algorithms(names: Sequence[str]) -> None:
             f"{len(names)} given, each may stand once and one is needed",
             f"Give one or more of {', '.join(known)}, separated by commas.",
         )
+
+
+def check_made(machine: Machine, tuning: Tuning, names: Sequence[str], planner_hz: float) -> None:
+    """Make every algorithm once, so that what is missing is said before anything is driven.
+
+    Raises:
+        ConfigError: One cannot be made with these tunables.
+    """
+    for name in names:
+        try:
+            prepare(machine, replace(tuning, algorithm=name), 1.0 / planner_hz)
+        except TunableError as error:
+            raise ConfigError(
+                f"tuning of {name}: {error.tunable}", error.what, f"Allowed: {error.allowed}."
+            ) from error
 
 
 def check_scale(scale: float) -> None:

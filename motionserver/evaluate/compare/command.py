@@ -20,6 +20,7 @@ from motionserver.evaluate.compare.run import Result, run_tasks
 from motionserver.evaluate.compare.table import COLUMNS, Block, blocks, to_text
 from motionserver.evaluate.hindsight import HINDSIGHT_RULE
 from motionserver.evaluate.options import EvaluateOptions
+from motionserver.evaluate.ranges import check_made
 from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.tune.preset import read_fold_tunings
 from motionserver.evaluate.yardstick import RULE
@@ -57,6 +58,7 @@ def compare(folder: Path, out: Path, options: EvaluateOptions) -> int:
                 "--algorithm", f"unknown {name!r}", f"Allowed: {', '.join(known_algorithms())}."
             )
     machine, tuning = options.machine(), options.tuning()
+    check_made(machine, tuning, names, options.planner_hz)
     preview = options.preview or UPPER_BOUND
     folds = _folds(options.held_out, [recording.stem for recording in recordings], tuning)
     trouble = options.disturbance()

@@ -15,7 +15,7 @@ from motionserver.evaluate.omct.report import conditions, to_mapping, to_text
 from motionserver.evaluate.omct.run import RATE_HZ, SLOW, run_omct
 from motionserver.evaluate.omct.sines import FREQUENCIES
 from motionserver.evaluate.options import EvaluateOptions
-from motionserver.evaluate.ranges import check_algorithms
+from motionserver.evaluate.ranges import check_algorithms, check_made
 
 
 def omct(
@@ -47,6 +47,7 @@ def omct(
     boundaries = None if boundaries_file is None else read_boundaries(boundaries_file)
     make_folder("--out", out)
     machine, tuning = options.machine(), options.tuning()
+    check_made(machine, tuning, names, options.planner_hz)
 
     def tell(text: str) -> None:
         print(f"omct: {text}", file=sys.stderr, flush=True)  # noqa: T201

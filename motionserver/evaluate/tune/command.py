@@ -11,7 +11,7 @@ import numpy as np
 from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
 from motionserver.evaluate.files import make_folder
-from motionserver.evaluate.ranges import PLANNER_RATES_HZ, check_algorithms
+from motionserver.evaluate.ranges import PLANNER_RATES_HZ, check_algorithms, check_made
 from motionserver.evaluate.recording import Recording, read_all
 from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.criterion import SICKNESS_WEIGHT, Criterion
@@ -95,6 +95,7 @@ def tune(
         default_for(machine),
         {"algorithm": algorithm, "scale": scale, "tilt_rate_deg_s": tilt_rate_deg_s},
     )
+    check_made(machine, base.to_tuning(), [algorithm], planner_hz)
     settings = Settings(
         algorithm,
         Criterion(criterion, sickness_weight),
