@@ -36,6 +36,7 @@ recording: `motionserver evaluate`, `tune` and `replay` read the file as it is.
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,9 +44,12 @@ from typing import Final
 
 import numpy as np
 
+from motionserver.bounded_files import MIB, read_bounded_text
 from motionserver.core.axes import AXIS_NAMES, Array
 from motionserver.errors import MotionServerError
 
+LARGEST_FILE: Final = 1024 * MIB
+"""Largest recording that is read."""
 FORCE: Final = ("x_m_s2", "y_m_s2", "z_m_s2")
 CUE: Final = (
     *("t", "ax", "ay", "az", "p", "q", "r", "v", "roll", "pitch", "mode"),
@@ -97,8 +101,8 @@ def read_recorded(path: Path) -> Recorded:
         RecordError: It cannot be read, or is no recording.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            header, *rows = list(csv.reader(stream)) or [[]]
+        text = read_bounded_text(path, LARGEST_FILE)
+        header, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise RecordError(f"{path}: cannot be read ({error})") from error
     names = [name.removesuffix("_kappa") for name in header if name.endswith("_kappa")]

@@ -19,6 +19,7 @@ from motionserver.cueing.predictor import PredictorError
 from motionserver.cueing.predictor import load as load_predictor
 from motionserver.errors import ConfigError
 from motionserver.evaluate.omct.boundaries import read_boundaries
+from motionserver.evaluate.tune.cache import ResultCache
 from motionserver.evaluate.tune.preset import read_fold_tunings
 from motionserver.guard.loop import as_request
 from motionserver.planner.session_file import SessionKeeper
@@ -29,6 +30,7 @@ from motionserver.settings.machine import load_machine
 from motionserver.settings.resolve import resolve
 from motionserver.settings.tuning_presets import PresetShelf
 from motionserver.telemetry.blackbox.reader import DumpError, read_dump
+from motionserver.telemetry.recorded import RecordError, read_recorded
 from motionserver.web.config import WebConfig, WebConfigError
 from motionserver.web.tokens import load_tokens
 
@@ -92,6 +94,8 @@ READERS = {
     "boundaries": (read_boundaries, ConfigError),
     "folds": (read_fold_tunings, ConfigError),
     "dump": (read_dump, DumpError),
+    "recorded": (read_recorded, RecordError),
+    "cache": (ResultCache, ConfigError),
 }
 
 

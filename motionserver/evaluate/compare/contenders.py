@@ -13,11 +13,13 @@ import numpy as np
 from motion_protocol import preview_times
 
 import motionserver
+from motionserver.bounded_files import MIB, read_bounded
 from motionserver.core.limits import Machine
 from motionserver.cueing.tuning import Tuning
 from motionserver.evaluate.disturbance import Disturbance
 from motionserver.evaluate.progress import Share
 
+LARGEST_RECORDING: Final = 1024 * MIB
 RIVALS: Final = ("yardstick", "hindsight", "no motion")
 """Always in the table."""
 PREDICTING: Final = ("default", "constant", "preview")
@@ -104,7 +106,7 @@ class Task:
         tuning: dict[str, Any] = asdict(contender.tuning)
         tuning["box"] = contender.tuning.box.tolist()
         words = [
-            hashlib.sha256(self.recording.read_bytes()).hexdigest(),
+            hashlib.sha256(read_bounded(self.recording, LARGEST_RECORDING)).hexdigest(),
             contender.name,
             repr(sorted(tuning.items())),
             repr((preview_times(contender.preview), contender.disturbance)),

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from motionserver.bounded_files import MIB, read_bounded_text
 from motionserver.core.axes import Array
 from motionserver.evaluate.compare.contenders import Task
 from motionserver.evaluate.compare.worker_share import forget_share, share_of, tell_share
@@ -26,6 +27,7 @@ from motionserver.evaluate.recording import read_recording
 from motionserver.evaluate.worker_pool import worker_pool
 from motionserver.evaluate.yardstick import find_yardstick, yardstick_of
 
+LARGEST_RESULT: Final = 64 * MIB
 CURVE_HZ: Final = 20.0
 """Rate of the curves that are kept for the page [Hz]."""
 _LOOK: Final = 2.0
@@ -218,7 +220,7 @@ def _guarded(task: Task, file: Path) -> tuple[Result | None, str]:
 
 def _kept(file: Path) -> Result | None:
     try:
-        result = json.loads(file.read_text(encoding="utf-8"))
+        result = json.loads(read_bounded_text(file, LARGEST_RESULT))
     except (OSError, ValueError):
         return None
     return result if isinstance(result, dict) else None

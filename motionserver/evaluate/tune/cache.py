@@ -15,9 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 import motionserver
+from motionserver.bounded_files import MIB, read_bounded_text
 from motionserver.errors import ConfigError
 from motionserver.evaluate.tune.outcome import Job, Outcome
 
+LARGEST_CACHE: Final = 1024 * MIB
 _SOURCES: Final = (
     "core/**/*.py",
     "cueing/**/*.py",
@@ -27,6 +29,7 @@ _SOURCES: Final = (
     "evaluate/disturbance.py",
     "evaluate/drive.py",
     "evaluate/hearing.py",
+    "evaluate/live.py",
     "evaluate/lockstep.py",
     "evaluate/recording.py",
     "evaluate/metrics/*.py",
@@ -81,7 +84,7 @@ class ResultCache:
 
     def _lines(self) -> Iterator[tuple[str, Outcome]]:
         try:
-            text = self._path.read_text(encoding="utf-8") if self._path.exists() else ""
+            text = read_bounded_text(self._path, LARGEST_CACHE) if self._path.exists() else ""
         except (OSError, UnicodeDecodeError) as error:
             raise _unusable(self._path, error) from error
         for line in text.splitlines():
