@@ -78,6 +78,9 @@ class Recorder:
         self._seen = message[0]
         clock = GuardClock.unpack(message[1])
         self.heard_ns = clock.written_ns
+        if clock.newest_id not in self._plans:
+            # accepted since the look above; the guard tells a plan before its clock
+            self._take_plan()
         if clock.sent_ns == self._sent_ns:
             return None
         self._sent_ns = clock.sent_ns
@@ -144,9 +147,13 @@ class Recorder:
             del self._plans[next(iter(self._plans))]
 
     def _posture(self, clock: GuardClock) -> list[str]:
-        """Pose and legs, from the plan that is played; from the guard's own word without one."""
+        """Pose and legs, from the plan that is played; from the guard's own word before the first.
+
+        Empty where a plan is played that was replaced before it was read.
+        """
         pose = self._played(clock)
-        if pose is None:
+        if pose is None and not (clock.newest_id and self._plans):
+            # the snapshot is older than the packet: no substitute while a plan is played
             pose = self._told()
         if pose is None:
             return [""] * 12

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rig import Rig, cli, environment
+from scipy.interpolate import CubicSpline
 
 G = 9.81
 HEAD = (0.0, 0.0, 0.7)
@@ -46,13 +47,24 @@ def live_nrmse(path: Path) -> float:
     runs = np.flatnonzero(table["state"] == "RUN")
     begin, end = table["time_s"][runs[0]], table["time_s"][runs[-1]]
     sent = np.flatnonzero((table["state"] != "") & np.isfinite(table["surge_m"]))
-    times = table["time_s"][sent]
+    # packets go out in slots; a recorder on a busy machine is late, or misses one
+    turns = table["time_s"][sent] * 60.0
+    phase = np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi)
+    slots, first = np.unique(np.round(turns - phase), return_index=True)
     names = ("surge_m", "sway_m", "heave_m", "roll_rad", "pitch_rad", "yaw_rad")
-    grid = np.arange(begin, end, 1.0 / 60.0)
-    pose = np.column_stack([np.interp(grid, times, table[name][sent]) for name in names])
+    sent_pose = np.column_stack([table[name][sent][first] for name in names])
+    way = CubicSpline((slots + phase) / 60.0, sent_pose)
+    grid = np.arange(begin, end, 1.0 / 240.0)
+    pose = way(grid)
     turn = np.stack([own_rotation(*row[3:]) for row in pose])
+    # the head swings about the reference point: small steps of the same smooth way
+    step = 1e-3
+    before, after = (
+        way(at)[:, :3] + np.stack([own_rotation(*row[3:]) for row in way(at)]) @ np.array(HEAD)
+        for at in (grid - step, grid + step)
+    )
     head = pose[:, :3] + turn @ np.array(HEAD)
-    accelerated = np.gradient(np.gradient(head, grid, axis=0), grid, axis=0)
+    accelerated = (after - 2.0 * head + before) / step**2
     felt = np.einsum("nji,nj->ni", turn, accelerated + np.array([0.0, 0.0, G]))
     cue = np.flatnonzero(np.isfinite(table["t"]))
     t, (roll, pitch) = table["t"][cue], (table[n][cue] for n in ("roll", "pitch"))
@@ -110,6 +122,7 @@ def test_record_keeps_every_believed_packet_with_all_it_said(recorded: Path) -> 
     assert sum(text != "" for text in table["settings"]) == 1
 
 
+@pytest.mark.timeout(900)  # three rivals are driven as well
 def test_evaluate_of_a_live_drive_gives_the_live_figure(recorded: Path, tmp_path: Path) -> None:
     figures = tmp_path / "figures.json"
     ended = cli(

@@ -96,6 +96,29 @@ def test_without_a_plan_the_guards_word_counts_and_without_that_nothing(scene: S
     assert (scene.look() or {})["surge_m"] == "0.010000"
 
 
+def test_a_plan_accepted_between_the_two_looks_is_not_taken_for_the_guards_old_word(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene.maps.guard.write(json.dumps({"pose": [0.0, 0.0, -0.17, 0.0, 0.0, 0.0]}).encode())
+    scene.maps.accepted.write(pack(rest_at(np.array([0, 0, 0.03, 0, 0, 0.0]), 5)))
+    scene.packet(1, 5, 0.4)
+    assert (scene.look() or {})["heave_m"] == "0.030000"
+    read = scene.maps.clock.read
+
+    def while_reading() -> object:
+        scene.maps.accepted.write(pack(moving(6, 5, 0.03, 0.05)))
+        scene.packet(2, 6, 0.5)
+        return read()
+
+    scene.packet(2, 6, 0.5)
+    monkeypatch.setattr(scene.maps.clock, "read", while_reading)
+    assert (scene.look() or {})["heave_m"] == "0.040000"
+    monkeypatch.undo()
+    # one that was replaced before it could be read leaves the field empty, and invents nothing
+    scene.packet(3, 7, 0.1)
+    assert (scene.look() or {})["heave_m"] == ""
+
+
 def test_forces_of_every_engine_that_ran_while_they_are_of_now(scene: Scene) -> None:
     scene.trace(100)
     scene.packet(110, 0, 0.0)
