@@ -2,8 +2,9 @@
 
 A packet can only be late if arrivals paused before it, and what was delayed then arrives closer
 together than it was sent. Lateness without such a pause is a clock that drifts or was set: it is
-learnt at once. Lateness after a pause that lasts, at the spacing at which packets are sent, is a
-longer way or a clock that stood still: it is learnt after a few packets.
+learnt at once, a sudden one from its second packet on. Lateness after a pause that lasts, at the
+spacing at which packets are sent, is a longer way or a clock that stood still: it is learnt after
+a few packets.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class SenderClock:
         self._explained = 0
         self._pause: tuple[int, int] | None = None
         self._after_pause = 0
+        self._is_doubted = False
 
     @property
     def complaint(self) -> str:
@@ -78,11 +80,19 @@ class SenderClock:
         else:
             # the queue behind a pause only gets shorter
             self._explained = min(self._explained, self._late)
-        self._late = late
+        before, self._late = self._late, late
         if late <= limit:
+            self._is_doubted = False
             return False
         self._after_pause += 1
-        if late > self._explained + interval + limit // 2 or self._lasts(arrival, stamp):
+        if late > self._explained + interval + limit // 2:
+            if late - before > limit and not self._is_doubted:
+                # one stamp alone may be a slip of its sender
+                self._is_doubted, self._late = True, before
+                return True
+            self._learn(offset)
+            return False
+        if self._lasts(arrival, stamp):
             self._learn(offset)
             return False
         return True
@@ -101,3 +111,4 @@ class SenderClock:
         self._least = offset
         self._late = self._explained = self._after_pause = 0
         self._pause = None
+        self._is_doubted = False
