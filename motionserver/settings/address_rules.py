@@ -96,6 +96,14 @@ def _check_platform(platform: PlatformSection) -> None:
             f"{platform.host} is a {_kind(peer)} address: no single platform answers to it",
             "Give the platform's own IP address.",
         )
+    if peer.version == 4 and not peer.is_loopback and peer.packed[-1] in (0, 255):
+        kind = "broadcast" if peer.packed[-1] == 255 else "network's own"
+        raise ConfigError(
+            "[platform] host",
+            f"{platform.host} is the {kind} address of the usual networks: no single platform "
+            "answers to it",
+            "Give the platform's own IP address, which ends in 1 to 254.",
+        )
     if isinstance(peer, ipaddress.IPv6Address) and peer.is_link_local and not peer.scope_id:
         raise ConfigError(
             "[platform] host",

@@ -56,6 +56,8 @@ def zenoh(**more):
         ("[platform] host", "wildcard", {"platform": {"host": "0.0.0.0"}}),
         ("[platform] host", "wildcard", {"platform": {"host": "::"}}),
         ("[platform] host", "broadcast", {"platform": {"host": "255.255.255.255"}}),
+        ("[platform] host", "broadcast", {"platform": {"host": "192.168.1.255"}}),
+        ("[platform] host", "network's own", {"platform": {"host": "192.168.1.0"}}),
         ("[platform] host", "multicast", {"platform": {"host": "239.1.2.3"}}),
         ("[platform] host", "multicast", {"platform": {"host": "ff02::1"}}),
         ("[platform] host", "reserved", {"platform": {"host": "241.0.0.1"}}),
