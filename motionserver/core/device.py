@@ -47,6 +47,7 @@ class Feedback:
         pose: Measured pose, (6,) [m, rad]; None if the format gives legs.
         faults: Names of the device's faults, latched ones included.
         estop: True while the emergency stop or an interlock is open.
+        is_home: True while the device's own switch says that it is settled, whatever its phase.
     """
 
     arrival_ns: int
@@ -56,3 +57,4 @@ class Feedback:
     pose: Array | None = None
     faults: tuple[str, ...] = ()
     estop: bool = False
+    is_home: bool = False

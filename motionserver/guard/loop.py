@@ -15,12 +15,12 @@ from typing import Any, Final
 from motionserver.bounded_files import read_bounded
 from motionserver.core.device import Feedback
 from motionserver.core.safety.act import Guard
+from motionserver.core.safety.ending import exit_status
 from motionserver.core.safety.given import Request, TickInput
 from motionserver.core.safety.inherit import inherit
 from motionserver.core.safety.patient import slices_per_tick
 from motionserver.core.safety.setpoint import Setpoint
-from motionserver.core.safety.states import RAISED, State
-from motionserver.core.safety.supervisor import is_standing
+from motionserver.core.safety.states import State
 from motionserver.core.safety.will import Will, will_of
 from motionserver.guard.options import GuardOptions
 from motionserver.guard.ports import Ports
@@ -168,7 +168,11 @@ class GuardLoop:
         self._box.note(given, setpoint, answers, is_sent)
         record = self.guard.record
         for (_, address), refusal in zip(requests, answers, strict=True):
-            answer = {"ok": not refusal, "state": record.state, "reason": refusal or record.reason}
+            answer = {
+                "ok": not refusal,
+                "state": record.state,
+                "reason": refusal or self.guard.reason,
+            }
             self._requests.answer(address, answer)
         self._log_events()
         if record.state is State.PARKED and self._ticks % 4096 == 0:
@@ -244,15 +248,13 @@ class GuardLoop:
             self._seen_event = record.events[-1][0]
 
     def _maybe_end(self, now: int) -> None:
-        """Leave once nothing moves: parked, never raised, or standing in a fault."""
-        record = self.guard.record
+        """Leave once it is down, was never raised, or could not be brought down in its time."""
         if not self._leave or self._done is None or self._done.done():
             return
-        offline = record.state is State.OFFLINE and now - self._start_ns > SECOND
-        if record.state is State.PARKED or offline:
-            self._done.set_result(0)
-        elif record.state not in RAISED | {State.OFFLINE} and is_standing(record.playback):
-            self._done.set_result(3)
+        guard = self.guard
+        status = exit_status(guard.record, guard.supervisor.device, self._start_ns, now)
+        if status is not None:
+            self._done.set_result(status)
 
 
 def as_request(message: dict[str, Any], enable_input: Path | None) -> Request:

@@ -49,7 +49,7 @@ def snapshot(
             "pid": os.getpid(),
             "t_ns": now_ns,
             "state": record.state,
-            "reason": record.reason,
+            "reason": guard.reason,
             "since_ns": record.since_ns,
             "dry_run": options.guard.dry_run,
             "order": setpoint.order,

@@ -129,4 +129,5 @@ class Moog6Dof2000E:
             measured[list(self._options.leg_order)] = values
             legs = frozen(measured + self._options.length_offset)
         faults = tuple(name for bit, name in _FAULTS.items() if latched & bit)
-        return Feedback(arrival_ns, phase, state, legs, pose, faults, bool(discrete & _ESTOP_SENSE))
+        is_stopped, is_home = bool(discrete & _ESTOP_SENSE), bool(discrete & _AT_HOME)
+        return Feedback(arrival_ns, phase, state, legs, pose, faults, is_stopped, is_home)

@@ -17,6 +17,7 @@ from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import Pace
 from motionserver.core.motion.moves import rest_to_rest
 from motionserver.core.safety import act
+from motionserver.core.safety import own_moves as own
 from motionserver.core.safety.given import GuardConfig, Request, TickInput
 from motionserver.core.safety.states import CUED, RAISED, State
 from motionserver.core.safety.verdict import AcceptedPlan
@@ -64,6 +65,7 @@ class Node(NamedTuple):
     now: int
     record: tuple
     supervisor: tuple
+    decision: tuple
     source: tuple
     device: tuple
     last: object
@@ -80,12 +82,14 @@ _RECORD = (
     "reset_until_ns",
     "leaving",
     "engaged_once",
+    "sent_legs",
 )
+_DECISION = ("_since", "_settles", "_seen_ns", "_phase", "status", "is_blocked")
 _SUPERVISOR = ("inconsistent", "astray", "_paused_ns", "_excused")
 _SOURCE = ("status", "_driving_since", "_silent_since")
 _DEVICE = (
     *("newest", "_valid_since", "_astray_since", "_excused", "_excused_ns"),
-    *("_still_at", "_still_since"),
+    *("_still_at", "_still_since", "_sound_since"),
 )
 
 
@@ -114,8 +118,8 @@ class CoarseGuard:
         self.first = self.node(START, False, False)
 
     def _remember(self, monkeypatch):
-        def known(name, key_of):
-            whole = getattr(act, name)
+        def known(name, key_of, room=act):
+            whole = getattr(room, name)
 
             def remembered(*given):
                 key = (name, *key_of(*given))
@@ -127,17 +131,18 @@ class CoarseGuard:
                     self.accepted[id(answer)] = answer
                 return answer
 
-            monkeypatch.setattr(act, name, remembered)
+            monkeypatch.setattr(room, name, remembered)
 
-        known("accept_rest", lambda m, pose, number, homes, reach: (pose.tobytes(), reach))
+        known("accept_rest", lambda m, pose, number, homes, reach: (pose.tobytes(), reach), own)
         known(
             "accept_move",
             lambda m, parent, at, goal, number, homes: (id(parent), at, goal.tobytes()),
+            own,
         )
         known(
             "accept_proposal", lambda m, plan, parent, clock, homes: (id(plan), id(parent), clock)
         )
-        known("forward", lambda m, legs: (legs.tobytes(),))
+        known("forward", lambda m, legs: (legs.tobytes(),), own)
         known("leg_speeds", lambda m, *state: tuple(map(bytes, state)))
         known("state_now", lambda playback: (id(playback.playing), playback.clock))
 
@@ -151,6 +156,7 @@ class CoarseGuard:
             now,
             tuple(getattr(record, name) for name in _RECORD),
             tuple(getattr(supervisor, name) for name in _SUPERVISOR),
+            tuple(getattr(supervisor.return_decision, name) for name in _DECISION),
             tuple(getattr(supervisor.source, name) for name in _SOURCE),
             tuple(getattr(supervisor.device, name) for name in _DEVICE),
             guard._last,
@@ -164,6 +170,7 @@ class CoarseGuard:
         for what, names, values in (
             (guard.record, _RECORD, node.record),
             (supervisor, _SUPERVISOR, node.supervisor),
+            (supervisor.return_decision, _DECISION, node.decision),
             (supervisor.source, _SOURCE, node.source),
             (supervisor.device, _DEVICE, node.device),
         ):
@@ -243,10 +250,10 @@ class CoarseGuard:
 
     def sign(self, node):
         """What tells this node from others: ages in ticks, and only where they are read."""
-        state, since, playback, deadline, accepted, reset, leaving, engaged_once = node.record
+        state, since, playback, deadline, accepted, reset, leaving, engaged_once, sent = node.record
         inconsistent, astray, paused, (excused_of, resumed) = node.supervisor
         status, driving, silent = node.source
-        newest, valid, off, excused, excused_ns, still_at, still_since = node.device
+        newest, valid, off, excused, excused_ns, still_at, still_since, sound = node.device
         now = node.now
         timed = state in (State.RAISING, State.PARKING)
         latched = state in (State.FAULT, State.SAFE)
@@ -276,6 +283,16 @@ class CoarseGuard:
                 _age(now, silent, 2),
             )
         held = (_age(now, since, 3), _age(now, max(since, paused), 2))
+        returns = None
+        if latched:
+            waits, settles, seen, phase, _, is_blocked = node.decision
+            unseen = now - seen > 2 * SECOND
+            returns = (
+                None if unseen else _age(now, waits, 1),
+                _age(now, sound, 1),
+                (settles, phase, is_blocked),
+                None if sent is None else tuple(np.round(sent, 4)),
+            )
         return (
             state,
             held if state is State.HOLD else None,
@@ -284,6 +301,7 @@ class CoarseGuard:
             upstream,
             excused_of == accepted,
             max(0, reset - now) if latched else 0,
+            returns,
             leaving,
             engaged_once,
             bool(inconsistent),

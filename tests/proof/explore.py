@@ -184,6 +184,17 @@ def rules(coarse, step):
         rule(step.had, "left by itself")
         rule(is_standing(step.before.record[2]), "left in motion")
         rule(after not in CUED and after is not State.RAISING, "left upwards")
+    # the way home in a fault begins after the device has answered without fault for long enough
+    if before in LATCHED and after is State.FAULT and is_standing(step.before.record[2]) and newest:
+        starts = order is Order.FOLLOW or (order is Order.PARK and not newest.faults)
+        starts = starts and newest.phase is not Phase.DISABLED
+        sound = step.after.device[7]
+        rule(
+            not starts or (sound is not None and step.after.now - sound >= 1_000_000_000),
+            "comes down too soon",
+        )
+        lost = step.after.now - newest.arrival_ns > 3_000_000_000
+        rule(not starts or not lost or _excused(step), "comes down beside a silent device")
     # up by an operator only
     if after is State.RAISING and entered:
         rule(before is State.PARKED and given.operator == "engage", "raised by itself")

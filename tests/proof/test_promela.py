@@ -124,6 +124,21 @@ def test_the_table_holds(tmp_path):
 
 
 @needs_spin
+@pytest.mark.parametrize(
+    ("way", "wrong"),
+    [
+        ("     :: else -> order = SETTLES", "     :: else -> order = WAITS"),
+    ],
+)
+def test_a_fault_that_leaves_people_up_is_noticed(tmp_path, monkeypatch, way, wrong):
+    whole = promela()
+    assert whole.count(way) == 1
+    monkeypatch.setitem(globals(), "promela", lambda _: whole.replace(way, wrong))
+    compiled(tmp_path)
+    assert any(errors(tmp_path, claim)[0] for claim in CLAIMS)
+
+
+@needs_spin
 @pytest.mark.parametrize("name", ["a fault heals itself", "a hold never ends"])
 def test_a_wrong_cell_is_noticed(tmp_path, name):
     compiled(tmp_path, with_cell(*MUTANTS[name]))

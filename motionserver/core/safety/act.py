@@ -6,27 +6,25 @@ import numpy as np
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.device import Order
-from motionserver.core.kinematics.forward import NoPoseError, forward
 from motionserver.core.kinematics.hexapod import leg_lengths, leg_speeds
 from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.plan import Plan
-from motionserver.core.safety.accept import accept_move, accept_proposal, accept_rest
+from motionserver.core.safety.accept import accept_proposal
 from motionserver.core.safety.edges import edges
+from motionserver.core.safety.fault_return import FaultReturn
 from motionserver.core.safety.given import GuardConfig, TickInput
+from motionserver.core.safety.own_moves import NEUTRAL, OwnMoves, ends_at_neutral
 from motionserver.core.safety.patient import PatientCheck, may_follow
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.setpoint import Setpoint
-from motionserver.core.safety.states import CUED, RAISED, Event, State
+from motionserver.core.safety.states import CUED, LATCHED, RAISED, Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
 from motionserver.core.safety.verdict import AcceptedPlan, Rejection
 from motionserver.core.safety.watchdog import SECOND
 from motionserver.core.state import PlatformState
 
-NEUTRAL = frozen(np.zeros(6))
 UNHEARD = 1.0
 """Longest time without a setpoint on the wire after which a plan is still continued [s]."""
-REACH = 0.005
-"""How far the first setpoint after a restart may differ from the measured legs [m]."""
 
 
 class Guard:
@@ -44,6 +42,10 @@ class Guard:
             config.plan_period,
             config.dry_run,
         )
+        device = self.supervisor.device
+        self.moves = OwnMoves(config.machine, self.record, device, self.homes)
+        self.fault_return = FaultReturn(self.record, self.supervisor, self.moves)
+        self._sent_before: Array | None = None
         self.judged: Plan | None = None
         """The proposal that was decided about in the last tick."""
         self._patient = (
@@ -67,7 +69,10 @@ class Guard:
             The setpoint to send now, if one is due; one answer per request, empty = granted.
         """
         record, supervisor = self.record, self.supervisor
-        record.leaving = record.leaving or given.leave
+        if given.leave and not record.leaving:
+            record.leaving = True
+            if record.state not in RAISED:
+                self._allow(self._park_bound(), given.now_ns)
         for feedback in given.feedback:
             supervisor.device.answered(feedback)
         supervisor.heard(given.now_ns, given.cue, given.gap)
@@ -79,6 +84,12 @@ class Guard:
         if not given.is_due:
             return None, answers
         return self._send(given.now_ns), answers
+
+    @property
+    def reason(self) -> str:
+        """Why it is in its state; in a fault also what is done or waited for, for people."""
+        status = self.supervisor.return_decision.status
+        return f"{self.record.reason}; {status}" if status else self.record.reason
 
     @property
     def is_checking(self) -> bool:
@@ -100,6 +111,7 @@ class Guard:
             self._unsent_ns = 0
             return
         record.playback, self.owes_sample = self._before, self._owed
+        record.sent_legs = self._sent_before
         self.supervisor.excuse_plans(record.accepted_ns, now_ns)
         self._unsent_ns = self._unsent_ns or now_ns
         unheard = (now_ns - self._unsent_ns) / SECOND
@@ -150,54 +162,42 @@ class Guard:
         record.counters[f"entered_{state.lower()}"] += 1
         record.state, record.reason, record.since_ns = state, reason, now_ns
         record.reset_until_ns = 0
+        self.supervisor.return_decision.enter()
         if state is State.RAISING:
-            self._start_at(NEUTRAL, self.homes, now_ns)
+            self._own(self.moves.start_at(NEUTRAL, self.homes), now_ns)
             self._allow(self.config.patience.raising, now_ns)
         elif state is State.PARKING:
             if before not in RAISED:
-                self._start_from_measured(now_ns)
-            playback = record.playback
-            travel = 0.0 if playback is None else playback.remaining + playback.newest.way_home
-            self._allow(2.0 * (travel + self.config.patience.lowering), now_ns)
+                self._own(self.moves.start_from_measured(), now_ns)
+            self._allow(self._park_bound(), now_ns)
         elif state in (State.PARKED, State.OFFLINE, State.SAFE):
             # a device that stopped by itself plays nothing: what follows begins where it stands
-            record.playback = None
+            record.playback = record.sent_legs = None
             self.supervisor.device.forgive()
+        if state in LATCHED and record.leaving and event is not Event.PARK_TIMEOUT:
+            # a service that ends waits so long for it to come down
+            self._allow(self._park_bound(), now_ns)
+
+    def _park_bound(self) -> float:
+        """Twice the time that all that is played, the way home and settling take [s]."""
+        playback, patience = self.record.playback, self.config.patience
+        travel = 0.0 if playback is None else playback.remaining + playback.newest.way_home
+        waits = patience.sound if self.record.state in LATCHED else 0.0
+        return 2.0 * (waits + travel + patience.lowering)
 
     def _allow(self, seconds: float, now_ns: int) -> None:
         self.record.deadline_ns = now_ns + int(seconds * SECOND)
 
-    def _start_at(self, pose: Array, homes: Array, now_ns: int) -> None:
-        record = self.record
-        accepted = accept_rest(self.machine, pose, record.take_id(), homes, REACH)
-        if isinstance(accepted, Rejection):
-            self.supervisor.inconsistent = f"cannot stand here: {accepted}"
-            record.note(now_ns, self.supervisor.inconsistent)
-        else:
-            record.playback = Playback(accepted, accepted.plan.duration)
-        self.supervisor.device.forgive()
-
-    def _start_from_measured(self, now_ns: int) -> None:
-        # what was played before its fault is not where it is now, also if it cannot be told where
-        self.record.playback = None
-        newest = self.supervisor.device.newest
-        assert newest is not None
-        # wherever the platform stands, the way home leads over neutral: no other need be straight
-        over = self.homes[:1]
-        try:
-            if newest.pose is not None:
-                self._start_at(newest.pose, over, now_ns)
-            elif newest.legs is not None:
-                self._start_at(forward(self.machine, newest.legs), over, now_ns)
-            else:
-                self.supervisor.inconsistent = "the device measures neither legs nor pose"
-        except NoPoseError as error:
-            self.supervisor.inconsistent = str(error)
+    def _own(self, refusal: str, now_ns: int) -> None:
+        """Note what forbids a plan of the guard's own; empty if nothing does."""
+        if refusal:
+            self.supervisor.inconsistent = refusal
+            self.record.note(now_ns, refusal)
 
     def _send(self, now_ns: int) -> Setpoint:
         record = self.record
         order = self._order(now_ns)
-        self._before = record.playback
+        self._before, self._sent_before = record.playback, record.sent_legs
         self._owed, self.owes_sample = self.owes_sample, False
         if record.playback is not None and order is Order.FOLLOW and not self._owed:
             ahead = advance(record.playback, self.config.send_period)
@@ -215,6 +215,7 @@ class Guard:
             return self._last
         sent = Order.WAIT if self.config.dry_run else order
         setpoint = Setpoint(sent, state, frozen(legs[0]))
+        self.fault_return.sent(sent, legs[0])
         if sent is Order.FOLLOW:
             self.supervisor.astray = self.supervisor.device.track(now_ns, legs[0], speeds[0])
         self._last = setpoint
@@ -229,33 +230,16 @@ class Guard:
         if record.state in CUED:
             return Order.FOLLOW
         if record.state is State.PARKING and record.playback is not None:
-            is_home = standing and _ends_at_neutral(record.playback)
+            is_home = standing and ends_at_neutral(record.playback)
             return Order.PARK if is_home else Order.FOLLOW
-        if record.state is State.FAULT and not standing:
-            return Order.FOLLOW
-        if record.state in (State.FAULT, State.SAFE) and record.reset_until_ns > now_ns:
-            return Order.RESET
-        newest = self.supervisor.device.newest
-        if record.state is State.FAULT and newest is not None and newest.faults:
-            return Order.PARK
-        return Order.WAIT
+        return self.fault_return.order(now_ns) if record.state in LATCHED else Order.WAIT
 
     def _homeward(self, playback: Playback, now_ns: int) -> Playback:
         """While parking: once at rest, followed by the straight move to neutral."""
-        record = self.record
-        if record.state is not State.PARKING or not playback.is_at_rest:
+        if self.record.state is not State.PARKING or not playback.is_at_rest:
             return playback
-        if _ends_at_neutral(playback):
+        ahead = self.moves.homeward(playback)
+        if isinstance(ahead, str):
+            self._own(ahead, now_ns)
             return playback
-        move = accept_move(
-            self.machine, playback.playing, playback.clock, NEUTRAL, record.take_id(), self.homes
-        )
-        if isinstance(move, Rejection):
-            self.supervisor.inconsistent = f"no way home: {move}"
-            record.note(now_ns, self.supervisor.inconsistent)
-            return playback
-        return follow(playback, move)
-
-
-def _ends_at_neutral(playback: Playback) -> bool:
-    return not np.any(playback.playing.plan.rest_pose)
+        return ahead

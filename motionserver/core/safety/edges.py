@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from motionserver.core.safety.given import GuardConfig, Request, TickInput
 from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.return_decision import ReturnDecision
 from motionserver.core.safety.states import Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
 from motionserver.core.safety.watchdog import SECOND
@@ -30,7 +31,9 @@ def edges(
         record.counters[f"request_{request.op}"] += 1
         refusal = ""
         if request.op == "park":
-            wishes.add(Event.PARK)
+            refusal = _park(record, supervisor.return_decision)
+            if not refusal:
+                wishes.add(Event.PARK)
         elif request.op == "reset":
             refusal = _reset(config, record, supervisor, now)
         elif request.op != "engage":
@@ -46,6 +49,18 @@ def edges(
         record.engaged_once = True
         wishes.add(Event.ENGAGE)
     return tuple(answers), frozenset(wishes)
+
+
+def _park(record: GuardRecord, decision: ReturnDecision) -> str:
+    """Why nothing follows from asking to park; empty where it is parked, or parks."""
+    if record.state is State.OFFLINE:
+        return "the device does not answer; it is parked as soon as it answers"
+    if record.state is State.SAFE:
+        return (
+            "the emergency stop is followed, nothing is moved; once it is closed and the cause is "
+            "gone, reset: that parks"
+        )
+    return decision.status if record.state is State.FAULT and decision.is_blocked else ""
 
 
 def _engage(

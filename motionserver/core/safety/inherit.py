@@ -43,6 +43,7 @@ def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool
     record.leaving, record.engaged_once = will.leaving, will.engaged_once
     record.next_id, record.accepted_ns = will.next_id, will.accepted_ns
     record.counters.update(will.counters)
+    record.deadline_ns = will.deadline_ns
     record.counters["takeovers"] += 1
     latched = will.state in (State.FAULT, State.SAFE)
     late = (now_ns - will.due_ns) / SECOND
@@ -54,15 +55,13 @@ def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool
         why = "it had taken over itself just before"
     elif will.plans:
         found = _played(guard, will)
-        if isinstance(found, str):
-            why = found
-        else:
-            playback = found
+        why = found if isinstance(found, str) else _astray(guard, will.feedback, found) or ""
+        playback = None if isinstance(found, str) or why else found
     if why and not latched:
         record.note(now_ns, f"the guard before ended in {will.state}; begins anew: {why}")
         return False
     record.state, record.reason, record.since_ns = will.state, will.reason, will.since_ns
-    record.deadline_ns, record.playback = will.deadline_ns, playback
+    record.playback, record.sent_legs = playback, will.sent_legs
     guard.owes_sample = not is_sent
     guard.supervisor.resume(will.feedback, record.accepted_ns, now_ns)
     how = "stays" if why else "goes on"
@@ -82,8 +81,7 @@ def _played(guard: Guard, will: Will) -> Playback | str:
             return str(verdict)
         accepted.append(verdict)
         before = plan
-    playback = Playback(accepted[0], will.clock, tuple(accepted[1:]))
-    return _astray(guard, will.feedback, playback) or playback
+    return Playback(accepted[0], will.clock, tuple(accepted[1:]))
 
 
 def _astray(guard: Guard, feedback: Feedback | None, playback: Playback) -> str | None:

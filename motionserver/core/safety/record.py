@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
+from motionserver.core.axes import Array
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.states import State
 from motionserver.core.safety.verdict import Reason, Rejection
@@ -21,8 +22,6 @@ class GuardRecord:
         playback: What is played; None while nothing is.
         deadline_ns: When raising or parking has taken too long [ns].
         accepted_ns: When the last proposal was accepted [ns].
-        judged_id: Number of the newest proposal that was decided about; 0 = none.
-        refusal: Why that one was refused; None if it was accepted.
         reset_until_ns: Until when a reset is being tried [ns].
         leaving: True once the service is to end: park, and engage no more.
         engaged_once: True once "auto" has used its single edge.
@@ -30,6 +29,9 @@ class GuardRecord:
         counters: Everything that is counted, by name.
         events: Newest (instant [ns], text), for people.
         rejections: Newest (instant [ns], rejection).
+        sent_legs: Where the device was sent last, (6,) [m]; None once it has moved by itself.
+        judged_id: Number of the newest proposal that was decided about; 0 = none.
+        refusal: Why that one was refused; None if it was accepted.
     """
 
     state: State = State.OFFLINE
@@ -38,8 +40,6 @@ class GuardRecord:
     playback: Playback | None = None
     deadline_ns: int = 0
     accepted_ns: int = 0
-    judged_id: int = 0
-    refusal: Reason | None = None
     reset_until_ns: int = 0
     leaving: bool = False
     engaged_once: bool = False
@@ -47,6 +47,9 @@ class GuardRecord:
     counters: Counter[str] = field(default_factory=Counter)
     events: deque[tuple[int, str]] = field(default_factory=lambda: deque(maxlen=40))
     rejections: deque[tuple[int, Rejection]] = field(default_factory=lambda: deque(maxlen=20))
+    sent_legs: Array | None = None
+    judged_id: int = 0
+    refusal: Reason | None = None
 
     def note(self, now_ns: int, text: str) -> None:
         """Keep an event for the page and the log."""

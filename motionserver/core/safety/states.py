@@ -114,6 +114,9 @@ RAISED: Final = frozenset({State.RAISING, State.READY, State.RUN, State.HOLD, St
 CUED: Final = frozenset({State.READY, State.RUN, State.HOLD})
 """States in which a planner's plans are played."""
 
+LATCHED: Final = frozenset({State.FAULT, State.SAFE})
+"""States that only an operator's reset makes ready again."""
+
 
 def after(state: State, event: Event) -> State:
     """The state that follows ``event`` in ``state``."""

@@ -8,8 +8,16 @@ from motionserver.core.device import Feedback, Phase
 from motionserver.core.limits import Machine
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.return_decision import ReturnDecision
 from motionserver.core.safety.states import CUED, Event, State, after
-from motionserver.core.safety.watchdog import SECOND, CueStatus, DeviceWatch, Patience, SourceWatch
+from motionserver.core.safety.watchdog import (
+    SECOND,
+    CueStatus,
+    DeviceWatch,
+    Patience,
+    SourceWatch,
+    reports_fault,
+)
 from motionserver.core.state import DriveMode
 
 
@@ -27,6 +35,7 @@ class Supervisor:
         self.patience = patience
         self.dry_run = dry_run
         self.device = DeviceWatch(machine, patience, send_period)
+        self.return_decision = ReturnDecision(patience, self.device)
         self.source = SourceWatch()
         self._no_plan_ns = int(patience.plans * plan_period * SECOND)
         self._gap = 2.0 * send_period
@@ -94,7 +103,7 @@ class Supervisor:
         if newest.estop:
             yield Event.ESTOP
         came_down = record.state in CUED and newest.phase is not Phase.UP and not self.dry_run
-        if newest.faults or newest.phase in (Phase.FAULTED, Phase.DISABLED) or came_down:
+        if reports_fault(newest) or came_down:
             yield Event.DEVICE_FAULT
             return
         if newest.estop or self.device.valid_for(now_ns) < self.patience.valid:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import Array
-from motionserver.core.device import Feedback
+from motionserver.core.device import Feedback, Phase
 from motionserver.core.kinematics.hexapod import leg_lengths
 from motionserver.core.limits import Machine
 from motionserver.core.state import DriveMode
@@ -37,6 +37,7 @@ class Patience:
         track_time: How long a larger error is borne.
         still: How long measured legs must not move before a plan may begin where they are.
         quiver: What counts as not moving [m].
+        sound: Answers without fault and without a break before a fault is brought home.
     """
 
     valid: float = 0.3
@@ -55,6 +56,7 @@ class Patience:
     track_time: float = 0.1
     still: float = 0.3
     quiver: float = 0.002
+    sound: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +155,7 @@ class DeviceWatch:
         self._late = max(patience.feedback, 6.0 * send_period)
         self._valid_since = self._excused_ns = self._still_since = 0
         self._astray_since: int | None = None
+        self._sound_since: int | None = None
         self._excused: Feedback | None = None
         self._still_at: Array | None = None
         self.newest: Feedback | None = None
@@ -162,7 +165,11 @@ class DeviceWatch:
         """Take a decoded answer."""
         if self.is_lost(feedback.arrival_ns):
             self._valid_since = feedback.arrival_ns
-            self._still_at = None
+            self._still_at = self._sound_since = None
+        if reports_fault(feedback) or feedback.estop:
+            self._sound_since = None
+        elif self._sound_since is None:
+            self._sound_since = feedback.arrival_ns
         legs = measured_legs(self._machine, feedback)
         moved = legs is not None and (
             self._still_at is None
@@ -196,6 +203,12 @@ class DeviceWatch:
         if self.is_lost(now_ns):
             return 0.0
         return (now_ns - self._valid_since) / SECOND
+
+    def sound_for(self, now_ns: int) -> float:
+        """How long answers have come without a break and without a fault in any of them [s]."""
+        if self._sound_since is None or self.is_lost(now_ns):
+            return 0.0
+        return (now_ns - self._sound_since) / SECOND
 
     def stands(self, now_ns: int) -> bool:
         """True if the measured legs have not moved for a while, or are not measured at all.
@@ -242,6 +255,11 @@ class DeviceWatch:
         """Start tracking anew: the platform is about to be told something else."""
         self._astray_since = None
         self.error = 0.0
+
+
+def reports_fault(feedback: Feedback) -> bool:
+    """True if the device says that it is faulty or switched off."""
+    return bool(feedback.faults) or feedback.phase in (Phase.FAULTED, Phase.DISABLED)
 
 
 def measured_legs(machine: Machine, feedback: Feedback) -> Array | None:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from motionserver.core.axes import frozen
+from motionserver.core.axes import Array, frozen
 from motionserver.core.device import Feedback, Phase
 from motionserver.core.plan import Plan, pack, unpack
 from motionserver.core.safety.record import GuardRecord
@@ -39,6 +39,7 @@ class Will:
         counters: Everything counted so far.
         before: The plan the played one took over from; None for a rest.
         plans: The played one, then those that wait; empty if nothing is played.
+        sent_legs: Where the device was sent last, (6,) [m]; None if that is unknown.
     """
 
     due_ns: int
@@ -56,9 +57,12 @@ class Will:
     counters: dict[str, int]
     before: Plan | None
     plans: tuple[Plan, ...]
+    sent_legs: Array | None = None
 
 
-_PLAIN: Final = tuple(f.name for f in fields(Will) if f.name not in ("feedback", "before", "plans"))
+_PLAIN: Final = tuple(
+    f.name for f in fields(Will) if f.name not in ("feedback", "before", "plans", "sent_legs")
+)
 _KINDS: Final = {
     "state": str,
     "reason": str,
@@ -90,6 +94,7 @@ def will_of(record: GuardRecord, feedback: Feedback | None, taken_ns: int, due_n
         dict(record.counters),
         accepted[0].before if accepted else None,
         tuple(each.plan for each in accepted),
+        record.sent_legs,
     )
 
 
@@ -114,6 +119,7 @@ class WillWriter:
         self._known = [(plan, self.plan(plan)) for plan in plans]
         head = {name: getattr(will, name) for name in _PLAIN}
         head["has_before"] = will.before is not None
+        head["sent_legs"] = None if will.sent_legs is None else will.sent_legs.tolist()
         head["feedback"] = None if will.feedback is None else _plain(will.feedback)
         parts = [json.dumps(head).encode(), *(packed for _, packed in self._known)]
         return b"".join(_LENGTH.pack(len(part)) + part for part in parts)
@@ -134,12 +140,13 @@ def unpack_will(data: bytes) -> Will:
         head = _checked(json.loads(parts[0]))
         plans = [unpack(part) for part in parts[1:]]
         before = plans.pop(0) if head.pop("has_before") else None
-        feedback = head.pop("feedback")
+        feedback, sent_legs = head.pop("feedback"), _six("sent_legs", head.pop("sent_legs"))
         return Will(
             **head | {"state": State(head["state"])},
             feedback=None if feedback is None else _feedback(feedback),
             before=before,
             plans=tuple(plans),
+            sent_legs=sent_legs,
         )
     except (LookupError, TypeError, ArithmeticError, RecursionError, struct.error) as error:
         raise ValueError(f"will of a guard: {type(error).__name__}: {error}"[:200]) from error
@@ -173,14 +180,16 @@ def _plain(feedback: Feedback) -> dict[str, Any]:
 
 
 def _feedback(plain: dict[str, Any]) -> Feedback:
-    arrays = {
-        name: None if plain[name] is None else frozen(plain[name]) for name in ("legs", "pose")
-    }
-    for name, array in arrays.items():
-        if array is not None and (array.shape != (6,) or not np.isfinite(array).all()):
-            raise ValueError(f"{name} are not six numbers")
-    for name, kind in (("arrival_ns", int), ("state", str), ("estop", bool)):
+    arrays = {name: _six(name, plain[name]) for name in ("legs", "pose")}
+    for name, kind in (("arrival_ns", int), ("state", str), ("estop", bool), ("is_home", bool)):
         if type(plain[name]) is not kind:
             raise TypeError(f"{name} is {plain[name]!r}"[:80])
     faults = tuple(str(fault) for fault in plain["faults"])
     return Feedback(**plain | arrays | {"phase": Phase(plain["phase"]), "faults": faults})
+
+
+def _six(name: str, values: Any) -> Array | None:  # noqa: ANN401  (whatever JSON holds)
+    array = None if values is None else frozen(values)
+    if array is not None and (array.shape != (6,) or not np.isfinite(array).all()):
+        raise ValueError(f"{name} are not six numbers")
+    return array

@@ -22,6 +22,7 @@ from motionserver.core.safety.states import CUED, RAISED, TABLE, Event, State
 CLAIMS: Final = {
     "stands_in_the_end": "[] (([] trouble) -> <> [] !moving)",
     "silence_parks": "[] ((calm && !latched) -> <> [] (state == PARKED))",
+    "a_fault_comes_down": "[] ((calm && state == FAULT) -> <> [] (phase == DOWN))",
 }
 """What must hold, by name, in linear temporal logic over the words of the model."""
 
@@ -32,13 +33,18 @@ _WORLD: Final = """\
 #define SILENT 0
 #define PAUSES 1
 #define DRIVES 2
+#define WAITS 0
+#define FOLLOWS 1
+#define SETTLES 2
 #define latched (state == FAULT || state == SAFE)
 #define moving (raised || (state == FAULT && !standing))
 
 byte state = OFFLINE;
 byte phase = DOWN;
 byte age = 0;
-bit standing = 1, calm = 0, trouble = 0, asked = 0, engaged = 0;
+/* ticks without a fault and without a break, and what the device was told last */
+byte sound = 0, order = WAITS;
+bit standing = 1, neutral = 1, calm = 0, trouble = 0, asked = 0, engaged = 0;
 
 /* what is of this tick only, and forgotten after it */
 byte source, next, event;
@@ -71,6 +77,9 @@ inline peaceful() {
   :: state == RAISING && phase < UP -> phase++
   :: state == PARKING && standing && phase > DOWN -> phase--
   :: (state == PARKED || state == OFFLINE) && phase == BETWEEN -> phase = DOWN
+  /* in a fault it obeys as ever: it settles when it is told to, and lifts to the end if it does */
+  :: state == FAULT && order == SETTLES && phase > DOWN -> phase--
+  :: state == FAULT && order != SETTLES && phase == BETWEEN -> phase = UP
   :: else -> skip
   fi;
   late = ((state == RAISING && age >= 4) || (state == PARKING && age >= 7)
@@ -103,6 +112,26 @@ inline notice() {
 }
 
 #define is_reset (event == E_RESET_BLIND || event == E_RESET_UP || event == E_RESET_DOWN)
+
+/* what is sent in a fault: see core.safety.fault_return */
+inline come_down() {
+  sound = ((lost || fault || estop) -> 0 : (sound < 2 -> sound + 1 : sound));
+  if
+  :: next != FAULT -> order = WAITS
+  :: next == FAULT && !standing -> order = FOLLOWS
+  :: next == FAULT && standing && fault -> order = SETTLES
+  :: next == FAULT && standing && !fault && (sound < 2 || phase == DOWN || astray) -> order = WAITS
+  :: next == FAULT && standing && !fault && sound == 2 && phase != DOWN && !astray ->
+     if
+     :: phase == UP && !neutral -> order = FOLLOWS; standing = 0; neutral = 1
+     :: else -> order = SETTLES
+     fi
+  fi;
+  /* who is silent or faulty is not moved anew; a stop is never played against */
+  assert(order != FOLLOWS || next == FAULT);
+  assert(order == WAITS || !estop);
+  assert(order != SETTLES || !lost)
+}
 
 inline account() {
   /* FAULT and SAFE are left by an operator's edge only, but that a stop is followed in a fault */
@@ -147,6 +176,12 @@ inline account() {
   fi;
   /* who is up was engaged */
   assert(engaged || !(next == READY || next == RUN || next == HOLD));
+  if
+  :: next == RAISING || next == PARKED || next == OFFLINE || next == SAFE -> neutral = 1
+  :: next == READY || next == RUN || next == HOLD || next == PARKING -> any(neutral)
+  :: next == FAULT -> skip
+  fi;
+  come_down();
   /* a calm world faults nobody */
   assert(!calm || latched || !(next == FAULT || next == SAFE));
   state = next

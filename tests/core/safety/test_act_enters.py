@@ -12,7 +12,7 @@ from own_kinematics import lengths
 from motionserver.core.axes import frozen
 from motionserver.core.device import Feedback, Order, Phase
 from motionserver.core.motion.moves import straight_way
-from motionserver.core.safety import act
+from motionserver.core.safety import act, own_moves
 from motionserver.core.safety.accept import accept_move
 from motionserver.core.safety.states import State
 
@@ -165,7 +165,7 @@ def test_only_a_parking_platform_goes_home_by_itself():
 def test_a_way_home_that_is_not_allowed_is_told_and_a_fault():
     scene = Scene(State.PARKING, playback=at_rest(LIFTED))
     machine = compact()
-    scene.guard.machine = replace(machine, pace=replace(machine.pace, speed=1e-4))
+    scene.guard.moves.machine = replace(machine, pace=replace(machine.pace, speed=1e-4))
     assert scene.tick().state.pose.tolist() == LIFTED.tolist(), "it stands where it was"
     told = scene.guard.supervisor.inconsistent
     assert told.startswith("no way home: plan rejected: malformed")
@@ -175,11 +175,11 @@ def test_a_way_home_that_is_not_allowed_is_told_and_a_fault():
 
 
 def test_the_documented_reaches():
-    assert (act.UNHEARD, act.REACH) == (1.0, 0.005)
+    assert (act.UNHEARD, own_moves.REACH) == (1.0, 0.005)
 
 
 def test_a_guard_begins_anew_with_its_tracking_when_it_is_told_something_else():
     b = in_state("RUN")
     b.guard.supervisor.device.error = 0.5
-    b.guard._start_at(ZERO, HOMES, b.now)
+    assert b.guard.moves.start_at(ZERO, HOMES) == ""
     assert b.guard.supervisor.device.error == 0.0

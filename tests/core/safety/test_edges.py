@@ -67,9 +67,26 @@ def test_an_unknown_request_is_told_what_is_known():
     assert scene.record.counters == {"request_dance": 1, "request_refused": 1}
 
 
-def test_parking_is_always_granted():
-    for state in State:
+def test_parking_is_granted_wherever_the_platform_is_down_or_comes_down():
+    for state in set(State) - {State.OFFLINE, State.SAFE}:
         assert Scene(state).ask("park") == (("",), {Event.PARK})
+
+
+@pytest.mark.parametrize(
+    ("state", "said"),
+    [
+        (State.OFFLINE, "the device does not answer; it is parked as soon as it answers"),
+        (State.SAFE, "once it is closed and the cause is gone, reset: that parks"),
+        (State.FAULT, "it cannot go home by itself: no way"),
+    ],
+)
+def test_parking_is_refused_where_nothing_would_follow(state, said):
+    scene = Scene(state)
+    scene.supervisor.return_decision.wait_again("no way")
+    answers, wishes = scene.ask("park")
+    assert said in answers[0]
+    assert not wishes
+    assert scene.record.counters == {"request_park": 1, "request_refused": 1}
 
 
 def test_every_request_of_a_tick_has_its_answer_in_order():

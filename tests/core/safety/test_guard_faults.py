@@ -227,11 +227,15 @@ def test_a_network_that_refuses_is_a_fault(state, seconds):
     assert "the network takes no setpoint" in b.record.reason
     b.run(seconds)
     b.device.unreachable = False
-    frames = len(b.sent)
-    stands(b, 8.0)
+    where, frames = np.array(b.device.legs), len(b.sent)
+    stands(b, 20.0)
     followed = [s for s in b.sent[frames:] if s.order is Order.FOLLOW]
     if seconds > 1.0:
-        assert not followed
+        # the device has stopped by itself: its plan is over, what follows begins where it stands
+        assert all(s.order is not Order.FOLLOW for s in b.sent[frames : frames + 55])
+        assert np.abs(followed[0].legs - where).max() < 5e-3
     legal(b)
+    assert b.state == "FAULT"
+    assert b.device.phase is Phase.DOWN
     assert b.tick("reset") == ("",)
-    b.until("PARKED", 40.0)
+    b.until("PARKED", 1.0)

@@ -100,7 +100,7 @@ def test_a_rest_without_a_way_home_is_a_fault():
     blocked = AcceptedPlan(rest_at(np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.0]), 99), None, 1.0)
     b.record.playback = Playback(blocked)
     slow = replace(b.machine, pace=replace(b.machine.pace, speed=1e-4))
-    b.guard.machine = slow
+    b.guard.moves.machine = slow
     b.run(0.2)
     assert b.state == "FAULT"
     assert "no way home" in b.record.reason
@@ -109,7 +109,7 @@ def test_a_rest_without_a_way_home_is_a_fault():
 def test_a_neutral_nobody_can_stand_at_is_a_fault():
     b = Bench(compact())
     b.until("PARKED", 1.0)
-    b.guard.machine = replace(b.machine, leg_min=1.1)
+    b.guard.moves.machine = replace(b.machine, leg_min=1.1)
     b.tick()
     b.tick("engage")
     b.until("FAULT", 0.1)
@@ -135,8 +135,8 @@ def test_a_reset_waits_until_a_raised_device_no_longer_moves():
     b = in_state("RUN")
     b.device.silent = True
     b.until("FAULT", 0.2)
-    b.device.silent = False
     b.run(5.0)
+    b.device.silent = False
     begin = np.array(b.device.legs)
     for k in range(240):
         # it is moved by something else

@@ -11,7 +11,7 @@ from own_kinematics import lengths
 from motionserver.core.axes import frozen
 from motionserver.core.device import Order, Phase
 from motionserver.core.safety.accept import accept_rest
-from motionserver.core.safety.act import REACH
+from motionserver.core.safety.own_moves import REACH
 from motionserver.core.safety.states import RAISED, State
 from motionserver.core.safety.verdict import Reason
 

@@ -258,6 +258,7 @@ def test_how_long_each_silence_is_borne():
         "track_time": 0.1,
         "still": 0.3,
         "quiver": 0.002,
+        "sound": 1.0,
     }
 
 

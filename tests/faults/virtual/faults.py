@@ -4,6 +4,7 @@ from itertools import combinations
 
 import scenes_around
 import scenes_client
+import scenes_muted
 import scenes_packets
 import scenes_planner
 import scenes_platform
@@ -18,6 +19,7 @@ FAULTS = {
         scenes_planner,
         scenes_process,
         scenes_around,
+        scenes_muted,
     )
     for cls in room.SCENES
 }
@@ -32,6 +34,10 @@ REASONS = {
     frozenset((22, 23)): "who is asked to end is not started again",
     frozenset((22, 24)): "likewise",
     frozenset((23, 24)): "one guard dies once",
+    frozenset((22, 38)): "who is asked to end is asked once",
+    frozenset((23, 38)): "who is asked to end is not started again",
+    frozenset((24, 38)): "likewise",
+    frozenset((37, 38)): "one wire is silent once",
     frozenset((14, 15)): "one solver fails in one way at a time",
     frozenset((14, 16)): "likewise",
     frozenset((15, 16)): "likewise",

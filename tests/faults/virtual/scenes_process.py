@@ -5,7 +5,7 @@ from fittings import Slot
 from scenario import SEND, TICK, Fault
 
 from motionserver.core.device import Order
-from motionserver.core.safety.act import REACH
+from motionserver.core.safety.own_moves import REACH
 from motionserver.core.safety.states import RAISED, State
 
 
