@@ -191,12 +191,16 @@ def _named(config: Path | None, run_dir: Path | None) -> Server | None:
 
 
 def _announcement_folders() -> list[Path]:
-    """Where servers announce themselves, our own first: a login without the first is told too."""
+    """Where servers announce themselves, our own first.
+
+    A login may come with XDG_RUNTIME_DIR or without; one that points elsewhere than a login's does
+    is a world of its own.
+    """
     user = os.getuid()
-    given = os.environ.get("XDG_RUNTIME_DIR")
-    bases = [Path(given)] if given else []
-    bases += [Path(f"/tmp/motionserver-{user}"), Path(f"/run/user/{user}")]
-    return [base / _FOLDER for base in dict.fromkeys(bases)]
+    given, login = os.environ.get("XDG_RUNTIME_DIR"), f"/run/user/{user}"
+    without = f"/tmp/motionserver-{user}"
+    bases = [given] if given and given != login else [given or without, login, without]
+    return [Path(base) / _FOLDER for base in dict.fromkeys(bases)]
 
 
 def _announcements() -> list[Server]:
