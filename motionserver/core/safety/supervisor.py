@@ -9,6 +9,7 @@ from motionserver.core.limits import Machine
 from motionserver.core.motion.player import Playback
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.return_decision import ReturnDecision
+from motionserver.core.safety.source_reason import source_reason
 from motionserver.core.safety.states import CUED, Event, State, after
 from motionserver.core.safety.watchdog import (
     SECOND,
@@ -169,7 +170,7 @@ class Supervisor:
             return f"the platform does not follow: {self.device.error * 1e3:.1f} mm off"
         if event is Event.TROUBLE:
             if not self.source.is_fresh(now_ns):
-                return "the source is stale: nothing that can be believed comes from the simulator"
+                return f"the source is stale: {source_reason(self.source.status, now_ns)}"
             if self.source.is_paused:
                 return "the simulator pauses"
             return "no plan was accepted from the planner"
@@ -185,7 +186,7 @@ class Supervisor:
         if newest is None or newest.phase is not Phase.DOWN:
             return "the device does not say that it is down and ready"
         if not self.source.is_fresh(now_ns):
-            return "no fresh source that can be believed: start the simulator first"
+            return f"no fresh source: {source_reason(self.source.status, now_ns)}"
         return ""
 
 

@@ -6,6 +6,7 @@ from supervisor_scene import MOVING, MS, NEUTRAL, PERIOD, RESTING, Scene
 
 from motionserver.core.device import Feedback, Phase
 from motionserver.core.safety.record import GuardRecord
+from motionserver.core.safety.source_reason import source_reason
 from motionserver.core.safety.states import Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
 from motionserver.core.safety.watchdog import CueStatus, Patience
@@ -201,7 +202,8 @@ def test_why_it_holds_is_told():
     why, now = scene.supervisor.why, scene.now
     assert why(Event.TROUBLE, now) == "no plan was accepted from the planner"
     assert why(Event.TROUBLE, now + 151 * MS) == (
-        "the source is stale: nothing that can be believed comes from the simulator"
+        "the source is stale: the planner has not reported for 151 ms; the simulator was heard by "
+        "it until then"
     )
     scene.mode = DriveMode.PAUSE
     scene.tick()
@@ -218,7 +220,8 @@ def test_why_engaging_is_not_possible_is_told():
     refusal, record = scene.supervisor.refusal, scene.record
     assert refusal(record, scene.now) == ""
     assert refusal(record, scene.now + 151 * MS) == (
-        "no fresh source that can be believed: start the simulator first"
+        "no fresh source: the planner has not reported for 151 ms; the simulator was heard by it "
+        "until then"
     )
     record.state = State.RUN
     assert refusal(record, scene.now) == ("the state is RUN; engaging is possible in PARKED only")
@@ -245,3 +248,30 @@ def test_a_supervisor_begins_without_a_complaint():
     assert supervisor.inconsistent == ""
     assert supervisor.astray is False
     assert not supervisor.dry_run
+
+
+@pytest.mark.parametrize(
+    ("status", "said"),
+    [
+        (CueStatus(), "the planner has not reported yet: it is starting, or its process has ended"),
+        (
+            CueStatus(looked_ns=8_800 * MS),
+            "the planner has not reported for 1.2 s; it had heard no simulator",
+        ),
+        (
+            CueStatus(8_780 * MS, 150 * MS, heard_ns=8_780 * MS, looked_ns=8_800 * MS),
+            "the planner has not reported for 1.2 s; the simulator was heard by it until then",
+        ),
+        (
+            CueStatus(9_800 * MS, 150 * MS, heard_ns=9_800 * MS, looked_ns=9_990 * MS),
+            "the simulator's newest packet is 200 ms old",
+        ),
+        (
+            CueStatus(looked_ns=9_990 * MS),
+            "no packet of a simulator has arrived: start the simulator first",
+        ),
+        (CueStatus(0, 0, heard_ns=9_985 * MS, trouble="in g", looked_ns=9_990 * MS), "in g"),
+    ],
+)
+def test_the_side_that_is_late_is_named_with_its_age(status, said):
+    assert source_reason(status, 10_000 * MS) == said
