@@ -55,7 +55,9 @@ class JudgedLimits:
         period: Nominal time between two commands [s].
         may_lose: Whether the wire loses commands, so that a gap excuses a step of that long, and
             delays them, so that their spacing is not the sender's.
-        spacing: Least time between two commands, as a share of ``period``.
+        spacing: Least time between two commands, as a share of ``period``; closer ones are counted.
+        hiding: Closer than this share of ``period``, a command is an offence where the legs move: a
+            base that reads once a frame may not see it. Between the two lies what a network may do.
         wall_speed: Leg speed in wall time, as a multiple of ``speed``.
         in_wall_time: Whether the instants of arrival are exact enough to be judged; else they are
             only recorded.
@@ -67,5 +69,6 @@ class JudgedLimits:
     period: float = 1 / 60
     may_lose: bool = False
     spacing: float = 0.8
+    hiding: float = 0.5
     wall_speed: float = 1.25
     in_wall_time: bool = True

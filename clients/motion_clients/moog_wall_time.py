@@ -24,7 +24,7 @@ class WallTimeMonitor:
         limits: What is judged; nothing is where the wire may lose or delay commands, or where the
             instants are not exact.
         spacing: Smallest time between two commands [s]; None before the second.
-        too_close: Commands closer to the one before than allowed; harmless where nothing moves.
+        too_close: Commands closer to the one before than a host may send them.
         hidden_steps: Steps that such a command may have hidden from a base that reads once a frame.
         speeds: Largest leg speeds, six [m/s].
         too_fast: Steps too fast for their time though not for a whole period, by leg.
@@ -50,7 +50,7 @@ class WallTimeMonitor:
     def on_arrival(self, gap: float) -> None:
         """Take the time since the command before [s]."""
         self.spacing = gap if self.spacing is None else min(self.spacing, gap)
-        self.too_close += self._is_close(gap)
+        self.too_close += gap < self.limits.spacing * self.limits.period
 
     def on_step(self, gap: float, before: Six, after: Six) -> list[tuple[str, int | None, float]]:
         """Take one step of the legs [m] that was commanded ``gap`` seconds after the one before.
@@ -59,9 +59,10 @@ class WallTimeMonitor:
             Offences: kind, leg if it is one leg's, spacing [s] or speed [m/s].
         """
         offences: list[tuple[str, int | None, float]] = []
-        is_judged = self.is_judging and self._is_close(gap)
+        is_judged = self.is_judging and gap < self.limits.spacing * self.limits.period
         step = max(abs(end - start) for start, end in zip(before, after, strict=True))
-        if is_judged and step > _STEP_TOLERANCE:
+        is_hiding = is_judged and gap < self.limits.hiding * self.limits.period
+        if is_hiding and step > _STEP_TOLERANCE:
             self.hidden_steps += 1
             offences.append(("spacing", None, gap))
         allowed = self.limits.wall_speed * self.limits.speed + _SPEED_TOLERANCE
@@ -73,6 +74,3 @@ class WallTimeMonitor:
                 self.too_fast[leg] += 1
                 offences.append(("wall_speed", leg, speed))
         return offences
-
-    def _is_close(self, gap: float) -> bool:
-        return gap < self.limits.spacing * self.limits.period

@@ -18,6 +18,7 @@ from motionserver.errors import ConfigError
 from motionserver.telemetry.cue_history import CueReader
 from motionserver.telemetry.link import GuardClock, Maps
 from motionserver.telemetry.recorder import SILENT_NS, Recorder, write_recording
+from motionserver.telemetry.run_files import read_run_file
 from motionserver.telemetry.ticker import now_ns
 
 _POLITE = 10
@@ -39,7 +40,7 @@ def record(path: Path | None, out: Path, seconds: float | None, run_dir: Path | 
     run_dir = find_server("record", path, run_dir).run_dir
     try:
         maps = Maps(run_dir)
-        shown = json.loads((run_dir / "config.json").read_text("utf-8"))
+        shown = json.loads(read_run_file(run_dir, "config.json"))
         clock = maps.clock.read()
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else error

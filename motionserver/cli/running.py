@@ -14,6 +14,7 @@ from typing import Final
 
 from motionserver.errors import MotionServerError
 from motionserver.settings.config import Config, load_config, run_dir_of, state_dir_of
+from motionserver.telemetry.last_word import read_last_word
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.recorder import SILENT_NS
 from motionserver.telemetry.ticker import now_ns
@@ -154,11 +155,9 @@ def silence(server: Server) -> str | None:
         if owner != os.getuid() and not os.access(server.run_dir, os.R_OK | os.X_OK):
             name = _user_name(owner)
             return f"it belongs to the user {name}: ask as that user (sudo -u {name} ...)"
-        if not path.exists():
-            return "there is nothing of a running server in it"
         shown = MappedFile(path)
     except FileNotFoundError:
-        return "the folder does not exist"
+        return _left(server.run_dir)
     except OSError as error:
         return f"it cannot be read ({error.strerror})"
     except ValueError as error:
@@ -170,10 +169,20 @@ def silence(server: Server) -> str | None:
     if message is None:
         return "its guard has not reported yet"
     guard = json.loads(message[1])
-    age_ns = now_ns() - guard["t_ns"]
-    if age_ns <= SILENT_NS:
-        return None
-    return f"its last word is {age_ns * 1e-9:.0f} s old: {guard['state']}, {guard['reason']}"
+    return None if now_ns() - guard["t_ns"] <= SILENT_NS else _last_word(guard)
+
+
+def _left(run_dir: Path) -> str:
+    """What a folder tells in which no server has anything mapped."""
+    if not run_dir.exists():
+        return "the folder does not exist"
+    word = read_last_word(run_dir)
+    return "there is nothing of a running server in it" if word is None else _last_word(word)
+
+
+def _last_word(guard: dict[str, Any]) -> str:
+    age = 1e-9 * (now_ns() - guard["t_ns"])
+    return f"its last word is {age:.0f} s old: {guard['state']}, {guard['reason']}"
 
 
 def _named(config: Path | None, run_dir: Path | None) -> Server | None:

@@ -16,9 +16,16 @@ from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import read_options
 from motionserver.guard.ports import open_link
 from motionserver.telemetry.memory import lock_memory
+from motionserver.telemetry.oom import GUARD, set_oom_score
 from motionserver.telemetry.parent import follow_parent
 from motionserver.telemetry.realtime import take_priority
+from motionserver.telemetry.run_files import located
 from motionserver.telemetry.signals import ignore_signals, let_through
+
+LOCK = "guard.lock"
+"""Whoever holds it moves the platform."""
+NEXT = "spare.lock"
+"""Whoever holds it is next; the reserve waits for it."""
 
 
 def main() -> int:
@@ -40,10 +47,15 @@ def main() -> int:
     scheduling = take_priority(50, options.realtime)
     gc.collect()
     gc.freeze()
-    memory = lock_memory(options.realtime)
-    lock = os.open(run_dir / "guard.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    memory = f"{lock_memory(options.realtime)}, {set_oom_score(GUARD)}"
+    turn, lock = _opened(run_dir, NEXT), _opened(run_dir, LOCK)
     try:
+        # one after the other: which guard takes over is no matter of chance
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        # the service tells by it who is next
+        _note(turn, f"{os.getpid():<8}".encode())
         fcntl.flock(lock, fcntl.LOCK_EX)
+        os.close(turn)
         ended = os.pread(lock, 8, 0).strip()
         if told and ended:
             # the guard before it parked and left in order: nothing remains to be done
@@ -60,8 +72,12 @@ def main() -> int:
         os.close(lock)
 
 
+def _opened(run_dir: Path, name: str) -> int:
+    return os.open(located(run_dir, name), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+
+
 def _note(lock: int, text: bytes) -> None:
-    """Write over the one byte of the lock's file; a disk that is full keeps nobody from ending."""
+    """Write over the beginning of a lock's file; where that fails, nobody is kept from ending."""
     with contextlib.suppress(OSError):
         os.pwrite(lock, text, 0)
 

@@ -77,7 +77,7 @@ class GuardLoop:
         """
         loop = asyncio.get_running_loop()
         self._done = loop.create_future()
-        loop.add_signal_handler(signal.SIGTERM, self.ask_to_leave, "terminated")
+        loop.add_signal_handler(signal.SIGTERM, self._on_terminate)
         gc.freeze()
         gc.disable()
         ticker = Ticker(self._wake)
@@ -100,6 +100,8 @@ class GuardLoop:
         elif self._ports.has_predecessor:
             # it may have sent a packet just now
             self._grid.keep_apart(now)
+        if refusal := self._requests.refusal:
+            self.guard.record.note(now, refusal)
         self._arm(self._grid.first_tick(now))
 
     def _follow(self, will: Will, sent_ns: int | None, now: int) -> None:
@@ -115,6 +117,11 @@ class GuardLoop:
     def _arm(self, instant_ns: int) -> None:
         self._tick_due_ns = instant_ns
         self._ticker.arm(instant_ns)
+
+    def _on_terminate(self) -> None:
+        why = self._ports.leave_reason()
+        self.guard.supervisor.leave_reason = why
+        self.ask_to_leave(why or "terminated")
 
     def ask_to_leave(self, why: str) -> None:
         """Park and end; asking again does not hurry it."""

@@ -10,6 +10,7 @@ from typing import Any
 from motionserver.core.limits import machine_from_mapping
 from motionserver.core.safety.given import GuardConfig
 from motionserver.platforms.base import PlatformOptions
+from motionserver.telemetry.run_files import read_run_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +39,8 @@ class GuardOptions:
 
 
 def read_options(run_dir: Path) -> GuardOptions:
-    """Read ``config.json`` of a run directory."""
-    data: dict[str, Any] = json.loads((run_dir / "config.json").read_text("utf-8"))
+    """Read ``config.json`` of a run."""
+    data: dict[str, Any] = json.loads(read_run_file(run_dir, "config.json"))
     platform = data["platform"]
     options = dict(platform["options"])
     options["leg_order"] = tuple(options["leg_order"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import socket
 import struct
@@ -191,6 +192,14 @@ class Ports:
     def has_predecessor(self) -> bool:
         """Whether another guard has left something, readable or not."""
         return self._maps.will.newest_sequence() > 0
+
+    def leave_reason(self) -> str:
+        """Why the service ends, by its own word; empty if somebody wished it."""
+        message = self._maps.service.read()
+        try:
+            return "" if message is None else str(json.loads(message[1]).get("leaving", ""))[:200]
+        except (ValueError, AttributeError):
+            return ""
 
     def show(self, snapshot: bytes) -> None:
         """Publish the snapshot for the page; one that is too long is counted."""

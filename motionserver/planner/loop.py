@@ -38,6 +38,7 @@ from motionserver.telemetry.cue_history import CueNotes
 from motionserver.telemetry.link import Maps, pack_cue
 from motionserver.telemetry.logs import Seldom
 from motionserver.telemetry.memory import lock_memory
+from motionserver.telemetry.oom import PLANNER, set_oom_score
 from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.requests import RequestServer
 from motionserver.telemetry.signals import let_through
@@ -104,7 +105,8 @@ class PlannerLoop:
         gc.freeze()
         gc.disable()
         scheduling = take_priority(30, self.options.realtime)
-        self.scheduling = f"{scheduling}, {lock_memory(self.options.realtime)}"
+        memory = lock_memory(self.options.realtime)
+        self.scheduling = f"{scheduling}, {memory}, {set_oom_score(PLANNER)}"
         self._ticker = Ticker(self._wake)
         self._arm(now_ns())
         log.info("planner ready: %s; %s", self._thinker.tuning.algorithm, self.scheduling)

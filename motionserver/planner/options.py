@@ -9,6 +9,7 @@ from typing import Any
 
 from motionserver.core.axes import Array, frozen
 from motionserver.core.limits import Machine, machine_from_mapping
+from motionserver.telemetry.run_files import read_run_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +69,8 @@ class PlannerOptions:
 
 
 def read_options(run_dir: Path) -> PlannerOptions:
-    """Read ``config.json`` of a run directory."""
-    data: dict[str, Any] = json.loads((run_dir / "config.json").read_text("utf-8"))
+    """Read ``config.json`` of a run."""
+    data: dict[str, Any] = json.loads(read_run_file(run_dir, "config.json"))
     planner = data["planner"]
     inputs = tuple(
         InputOptions(

@@ -16,14 +16,16 @@ from zlib import crc32
 from motionserver.bounded_files import MIB, read_bounded
 from motionserver.planner.options import PlannerOptions
 from motionserver.planner.sessions import MOST, Sessions
+from motionserver.telemetry.link import SESSIONS_BYTES
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.run_files import located
 
 _MAGIC: Final = b"MCSESS01"
 _HEAD: Final = struct.Struct("<8sII")
 """Magic, number of sessions, CRC-32 of what follows."""
 LARGEST_FILE: Final = MIB
 _PAIR: Final = struct.Struct("<II")
-_RECENT: Final = 16
+_RECENT: Final = SESSIONS_BYTES // _PAIR.size
 """Sessions whose marks a planner that was killed leaves to the next one."""
 
 log = logging.getLogger("motionserver.planner")
@@ -35,11 +37,11 @@ class SessionKeeper:
     In the state directory the file is written when a session begins, by a thread of its own, and
     says of it that it is over: after a power cut nothing of it is believed. A soft end writes how
     far it came, so that a client which outlives the server goes on. A planner that is killed
-    leaves that in the run directory, in the kernel's memory, which costs a tick microseconds.
+    leaves that in memory that the service made, which costs a tick microseconds.
 
     Args:
         file: In the state directory.
-        recent: Mapped file in the run directory; gone after a restart of the service.
+        recent: Mapped file of the run; gone after a restart of the service.
 
     Attributes:
         counters: What went wrong, for the page.
@@ -118,7 +120,7 @@ def keeper_of(options: PlannerOptions, run_dir: Path) -> SessionKeeper | None:
     """The keeper of a planner that has sources with keys; None without any."""
     if not any(one.key for one in options.inputs):
         return None
-    return SessionKeeper(options.sessions_file, run_dir / "sessions.map")
+    return SessionKeeper(options.sessions_file, located(run_dir, "sessions.map"))
 
 
 def packed(marks: Iterable[tuple[int, int]]) -> bytes:

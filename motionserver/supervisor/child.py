@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import os
 import sys
@@ -34,6 +35,9 @@ class Child:
         name: Shown name.
         arguments: After ``python``.
         descriptors: File descriptors it inherits.
+        told: Environment variables of its own.
+        opens_signals: True for a program that lets its signals through itself, see
+            `telemetry.signals`: until then they wait.
         wanted: False once it shall not be started again.
         restarts: How often it was started again.
         exits: Exit status of each life.
@@ -44,6 +48,8 @@ class Child:
     name: str
     arguments: tuple[str, ...]
     descriptors: tuple[int, ...] = ()
+    told: dict[str, str] = field(default_factory=dict)
+    opens_signals: bool = False
     wanted: bool = True
     restarts: int = 0
     exits: list[int] = field(default_factory=list)
@@ -92,13 +98,13 @@ class Child:
 
     async def start(self, *more: str) -> asyncio.subprocess.Process:
         """Start it once, with ``more`` arguments behind its own."""
-        environment = {**os.environ, PARENT: str(os.getpid())}
+        environment = {**os.environ, **self.told, PARENT: str(os.getpid())}
         # one thread per process: a solver that spreads over the cores disturbs the guard
         for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
             environment.setdefault(name, "1")
         async with _starting:
             # until it has handlers of its own no signal ends it: they wait, or stay ignored
-            with held_back():
+            with held_back() if self.opens_signals else contextlib.nullcontext():
                 process = await asyncio.create_subprocess_exec(
                     sys.executable,
                     *self.arguments,

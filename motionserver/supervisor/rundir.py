@@ -15,8 +15,8 @@ from motionserver.telemetry.blackbox.room import clear_room
 
 log = logging.getLogger(__name__)
 LEFT: Final = (
-    *("*.map", "guard.sock", "planner.sock", "ask-*.sock"),
-    *("config.json", "web.json", "tuning.json"),
+    *("*.map", "guard.sock", "planner.sock", "files.sock", "ask-*.sock"),
+    *("config.json", "web.json", "tuning.json", "spare.lock", "last.json", "last.new"),
 )
 """What a run leaves in its directory, but for the locks."""
 MARKER: Final = ".motionserver-run"

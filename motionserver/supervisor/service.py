@@ -15,18 +15,29 @@ from motionserver.core.safety.states import CUED
 from motionserver.errors import ConfigError
 from motionserver.supervisor.addresses import claim_platform, open_link, try_addresses, try_way
 from motionserver.supervisor.child import Child
+from motionserver.supervisor.contents import (
+    has_histories,
+    is_not_pages,
+    is_pages,
+    make_contents,
+)
+from motionserver.supervisor.guards import GUARDS, GuardGroup
 from motionserver.supervisor.pulse import POLL, Pulse, is_runnable
+from motionserver.supervisor.run_dir_watch import POLL as WATCH
+from motionserver.supervisor.run_dir_watch import RunDirWatch
 from motionserver.supervisor.rundir import clean, take
 from motionserver.supervisor.standstill import IDLE, Standstill, activity_of
 from motionserver.supervisor.standstill import POLL as LOOK
-from motionserver.telemetry.blackbox.room import make_room
+from motionserver.telemetry.last_word import write_last_word
 from motionserver.telemetry.link import STATES, GuardClock, Maps
 from motionserver.telemetry.notify import Notifier
+from motionserver.telemetry.oom import SERVICE, set_oom_score
+from motionserver.telemetry.run_files import INHERITED
 from motionserver.telemetry.signals import PARKING
 from motionserver.telemetry.ticker import now_ns
 
-PARK_PATIENCE: Final = 90.0
-"""Longest wait for the guard to park when the service ends [s]."""
+LOST: Final = 4
+"""Exit status of a service that parked because its run directory was lost."""
 BOX_PATIENCE: Final = 10.0
 """Longest wait for a dump when the service ends [s]."""
 log = logging.getLogger("motionserver.supervisor")
@@ -59,71 +70,72 @@ class Service:
             try_addresses(resolved["sources"], resolved["web"] if config_web else None)
             undo.pop_all()
         self.local_port: int = self._link.getsockname()[1]
-        web = dict(resolved["web"])
-        core = {key: value for key, value in resolved.items() if key != "web"}
         clean(self.run_dir)
         try:
-            for name, content in (("config.json", core), ("web.json", web)):
-                # keys of signed sources are in it
-                (run_dir / name).touch(mode=0o600)
-                (run_dir / name).write_text(json.dumps(content), "utf-8")
-            self._maps = Maps(run_dir, create=True)
+            self._files = make_contents(run_dir, resolved)
+            self._maps = Maps(run_dir)
+            self._door = self._files.open_door()
         except OSError as error:
-            self._let_go()
+            for held in (self._link, self._claim, self._lock):
+                held.close()
             raise ConfigError(
                 "[server] run_dir", f"{run_dir}: {error.strerror}", "Give a folder with 1 MB free."
             ) from error
-        descriptor = self._link.fileno()
-        guard = ("-m", "motionserver.guard", str(run_dir), str(descriptor))
-        inherited = descriptor, self._claim.fileno()
-        self.guards = [Child(name, guard, inherited) for name in ("guard", "spare guard")]
-        self.planner = Child("planner", ("-m", "motionserver.planner", str(run_dir)))
-        self.planner.may_start = self._is_not_cued
-        self.web = Child("web", ("-m", "motionserver.web", str(run_dir / "web.json")))
-        self.web.wanted = config_web
-        self.box = self._black_box(resolved)
+        self._make_children(resolved, config_web)
+        self._run_dir_watch = RunDirWatch(run_dir, self._files)
         self._leave = asyncio.Event()
         self._manager = Notifier()
+        self._why = ""
         self.exit_status = 0
 
-    def _black_box(self, resolved: dict[str, Any]) -> Child:
-        """What keeps the last minute and writes it down; without room for it there is none."""
-        box, planner = resolved["blackbox"], resolved["planner"]
-        kept = box["kept"]
-        if kept:
-            try:
-                make_room(self.run_dir, resolved["platform"]["rate_hz"], 1.0 / planner["period"])
-            except OSError as error:
-                log.warning("no black box: no room for it (%s)", error.strerror)
-                kept = 0
-        where = (str(self.run_dir), box["folder"], str(kept))
-        child = Child("black box", ("-m", "motionserver.telemetry.blackbox", *where))
-        child.wanted = kept > 0
-        return child
+    def _make_children(self, resolved: dict[str, Any], config_web: bool) -> None:
+        files, run_dir = self._files, str(self.run_dir)
+        where, held = files.handed(is_not_pages)
+        told = {INHERITED: where}
+        link = self._link.fileno()
+        guard = ("-m", "motionserver.guard", run_dir, str(link))
+        inherited = (link, self._claim.fileno(), *held)
+        guards = [Child(name, guard, inherited, told, True) for name in GUARDS]
+        self.guards = GuardGroup(guards, self._maps, files)
+        self.planner = Child("planner", ("-m", "motionserver.planner", run_dir), held, told, True)
+        self.planner.may_start = self._is_not_cued
+        where, held_by_page = files.handed(is_pages)
+        page = ("-m", "motionserver.web", str(self.run_dir / "web.json"))
+        self.web = Child("web", page, held_by_page, {INHERITED: where}, True)
+        self.web.wanted = config_web
+        box = resolved["blackbox"]
+        watcher = ("-m", "motionserver.telemetry.blackbox", run_dir, box["folder"])
+        self.box = Child("black box", (*watcher, str(box["kept"])), held, told, True)
+        self.box.wanted = has_histories(files)
 
-    def leave(self) -> None:
-        """End softly: park, then stop everything."""
+    def leave(self, why: str = "") -> None:
+        """End softly: park, then stop everything; ``why`` is shown if it is no operator's wish."""
+        self._why = self._why or why
         self._leave.set()
 
     async def run(self) -> int:
         """Run until told to leave and parked.
 
         Returns:
-            0 if the guard ended parked, 3 if it ended standing in a fault.
+            0 if the guard ended parked, 3 if it ended standing in a fault, `LOST` if it parked
+            because the run directory was lost.
         """
         loop = asyncio.get_running_loop()
         for number in PARKING:
             loop.add_signal_handler(number, self.leave)
-        children = (*self.guards, self.planner, self.web, self.box)
+        children = (*self.guards.children, self.planner, self.web, self.box)
+        set_oom_score(SERVICE)
         keepers = [asyncio.create_task(child.keep()) for child in children]
-        works = (self._show(), self._feel_pulse(), self._replace_frozen())
+        works = (self._show(), self._feel_pulse(), self._replace_frozen(), self._watch_run_dir())
+        answering = asyncio.create_task(self._hand_out())
         watchers = [asyncio.create_task(work) for work in works]
         teller = asyncio.create_task(self._tell_manager())
         await self._leave.wait()
-        log.info("parking")
-        self._manager.tell(STOPPING=1, STATUS="parking")
+        log.info("parking%s", f": {self._why}" if self._why else "")
+        self._manager.tell(STOPPING=1, STATUS=f"parking {self._why}".strip())
+        self._write_snapshot()
         self.planner.wanted = self.web.wanted = False
-        self.exit_status = await self._park()
+        self.exit_status = await self.guards.park()
         for watcher in watchers:
             watcher.cancel()
         # the black box may be writing down how the guard ended
@@ -135,38 +147,15 @@ class Service:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(asyncio.gather(*keepers), 5.0)
         teller.cancel()
+        answering.cancel()
         ended = "parked" if self.exit_status == 0 else "standing in a fault"
         self._manager.tell(STATUS=f"ended {ended}")
         clean(self.run_dir)
-        self._let_go()
-        return self.exit_status
-
-    def _let_go(self) -> None:
-        for held in (self._link, self._claim, self._lock):
+        for held in (self._door, self._files, self._link, self._claim, self._lock):
             held.close()
-
-    async def _park(self) -> int:
-        """Let the active guard park; the spare is told too, and parks if its turn comes."""
-        active, spare = self._active()
-        for guard in (active, spare):
-            guard.wanted = False
-            guard.signal(signal.SIGTERM)
-        deadline = asyncio.get_running_loop().time() + PARK_PATIENCE
-        result = 3
-        while (left := deadline - asyncio.get_running_loop().time()) > 0.0:
-            try:
-                status = await active.ended(left)
-            except TimeoutError:
-                break
-            if status in (0, 3):
-                result = status
-                break
-            log.warning("%s ended with %s while parking; the other parks", active.name, status)
-            active, spare = spare, active
-            if active.pid is None:
-                await active.start("leave")
-        await asyncio.gather(*(guard.end(signal.SIGKILL, 1.0) for guard in (active, spare)))
-        return result
+        if self.exit_status == 0 and self._why:
+            self.exit_status = LOST
+        return self.exit_status
 
     def _is_not_cued(self) -> bool:
         """A planner that died is replaced once the platform parks: its successor knows nothing."""
@@ -176,18 +165,11 @@ class Service:
     @property
     def active_guard(self) -> Child:
         """The guard that moves the platform."""
-        return self._active()[0]
-
-    def _active(self) -> tuple[Child, Child]:
-        """The guard that holds the lock, by its own word, and the other."""
-        message = self._maps.guard.read()
-        pid = None if message is None else json.loads(message[1])["pid"]
-        first, second = self.guards
-        return (second, first) if second.pid == pid and pid is not None else (first, second)
+        return self.guards.active
 
     def _deaths(self) -> list[tuple[int, str, int, int]]:
         """Ends that nobody wanted, oldest first: instant [ns], who, exit status, process id."""
-        everybody = (*self.guards, self.planner, self.web, self.box)
+        everybody = (*self.guards.children, self.planner, self.web, self.box)
         return sorted(
             (at, child.name, status, pid) for child in everybody for at, status, pid in child.deaths
         )
@@ -243,28 +225,50 @@ class Service:
                 self._manager.tell(**more, WATCHDOG=1, STATUS=status)
             await asyncio.sleep(pause if ready else 0.05)
 
+    async def _hand_out(self) -> None:
+        """Give descriptors to others of this user, see `open_run_file`; one after the other."""
+        loop = asyncio.get_running_loop()
+        while True:
+            link, _ = await loop.sock_accept(self._door)
+            with link, contextlib.suppress(OSError, TimeoutError):
+                name = await asyncio.wait_for(loop.sock_recv(link, 256), 1.0)
+                self._files.answer(link, name)
+
+    async def _watch_run_dir(self) -> None:
+        """A run directory that is lost is an event: nobody could ask for parking any more."""
+        while True:
+            if (message := self._maps.guard.read()) is not None:
+                write_last_word(self.run_dir, json.loads(message[1]))
+            if lost := self._run_dir_watch.look():
+                log.error("%s: no operator is heard any more; parking and ending", lost)
+                self.leave(lost)
+                return
+            await asyncio.sleep(WATCH)
+
     async def _show(self) -> None:
         """Tell the page who lives."""
         while True:
-            active, spare = self._active()
-            self._maps.service.write(
-                json.dumps(
-                    {
-                        "pid": os.getpid(),
-                        "t_ns": now_ns(),
-                        "guard": active.pid,
-                        "spare": spare.pid,
-                        "planner": self.planner.pid,
-                        "web": self.web.pid,
-                        "blackbox": self.box.pid,
-                        "deaths": self._deaths(),
-                        "restarts": {
-                            "guard": sum(child.restarts for child in self.guards),
-                            "planner": self.planner.restarts,
-                            "web": self.web.restarts,
-                            "blackbox": self.box.restarts,
-                        },
-                    }
-                ).encode()
-            )
+            self._write_snapshot()
             await asyncio.sleep(0.1)
+
+    def _write_snapshot(self) -> None:
+        active, spare, reserve = self.guards.in_order()
+        snapshot = {
+            "pid": os.getpid(),
+            "t_ns": now_ns(),
+            "guard": active.pid,
+            "spare": spare.pid,
+            "reserve": reserve.pid,
+            "planner": self.planner.pid,
+            "web": self.web.pid,
+            "blackbox": self.box.pid,
+            "leaving": self._why,
+            "deaths": self._deaths(),
+            "restarts": {
+                "guard": sum(child.restarts for child in self.guards.children),
+                "planner": self.planner.restarts,
+                "web": self.web.restarts,
+                "blackbox": self.box.restarts,
+            },
+        }
+        self._maps.service.write(json.dumps(snapshot).encode())

@@ -16,6 +16,7 @@ import numpy as np
 from motionserver.core.axes import frozen
 from motionserver.core.state import DriveMode, Driver, Preview, VehicleMotion
 from motionserver.telemetry.blackbox.history import History, open_history
+from motionserver.telemetry.run_files import located
 
 _FILE: Final = "cues.map"
 _KEPT: Final = 1024  # four seconds of the fastest sender
@@ -121,7 +122,7 @@ class CueNotes:
     """
 
     def __init__(self, run_dir: Path) -> None:
-        self._history = open_history(run_dir / _FILE)
+        self._history = open_history(located(run_dir, _FILE))
         self.unreadable = 0
 
     def note(self, believed: Iterable[VehicleMotion]) -> None:
@@ -147,7 +148,7 @@ class CueReader:
     """
 
     def __init__(self, run_dir: Path) -> None:
-        self._history = open_history(run_dir / _FILE)
+        self._history = open_history(located(run_dir, _FILE))
         self._seen = 0
         self.missed = 0
         self.kept = self.new()

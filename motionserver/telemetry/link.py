@@ -15,6 +15,7 @@ from motionserver.core.safety.watchdog import CueStatus
 from motionserver.core.state import DriveMode
 from motionserver.telemetry.cue_history import make_cue_history
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.run_files import located
 from motionserver.telemetry.trace import TRACE_BYTES
 
 STATES: Final = tuple(State)
@@ -24,6 +25,8 @@ _CUE: Final = struct.Struct("<QQBQQ")
 _TROUBLE_BYTES: Final = 300
 """Longest sentence about the source's packets [bytes of UTF-8]."""
 SENT: Final = struct.Struct("<QQ")
+SESSIONS_BYTES: Final = 16 * 8
+"""Room for the signed sessions that a planner leaves to the next one."""
 PLAN_BYTES: Final = 64 + 2 * MAX_KNOTS * 19 * 8
 _WILL_BYTES: Final = 16384 + (2 + MOST_PENDING) * PLAN_BYTES
 
@@ -95,7 +98,7 @@ def unpack_cue(data: bytes) -> CueStatus:
 
 
 class Maps:
-    """The mapped files of one run directory.
+    """The mapped files of one run.
 
     Attributes:
         proposal: Planner to guard: the newest proposed plan.
@@ -116,7 +119,7 @@ class Maps:
 
     def __init__(self, run_dir: Path, create: bool = False) -> None:
         def opened(name: str, capacity: int) -> MappedFile:
-            return MappedFile(run_dir / f"{name}.map", capacity if create else None)
+            return MappedFile(located(run_dir, f"{name}.map"), capacity if create else None)
 
         self.proposal = opened("proposal", PLAN_BYTES)
         self.accepted = opened("accepted", PLAN_BYTES)
@@ -131,3 +134,8 @@ class Maps:
         self.trace = opened("trace", TRACE_BYTES)
         if create:
             make_cue_history(run_dir)
+
+    def close(self) -> None:
+        """Unmap all."""
+        for mapped in vars(self).values():
+            mapped.close()

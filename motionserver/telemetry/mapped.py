@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import mmap
 import os
+import stat
 import struct
 from pathlib import Path
 from typing import Final
 from zlib import crc32
+
+from motionserver.telemetry.run_files import open_run_file
 
 _MAGIC: Final = 0x4D53_4D46
 _HEAD: Final = struct.Struct("<II")
@@ -34,8 +37,10 @@ def mapping_of(path: Path, least: int) -> mmap.mmap:
         OSError: It cannot be opened.
         ValueError: It has fewer than ``least`` bytes.
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+    descriptor = open_run_file(path, os.O_RDWR)
     try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise ValueError(f"{path}: not a mapped file")
         size = os.fstat(descriptor).st_size
         if size < least:
             raise ValueError(f"{path}: not a mapped file ({size} bytes)")

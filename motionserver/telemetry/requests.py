@@ -22,15 +22,23 @@ class RequestError(OSError):
 
 
 class RequestServer:
-    """The receiving end; polled from a tick, never waits."""
+    """The receiving end; polled from a tick, never waits.
+
+    Attributes:
+        malformed: Requests that were none.
+        refusal: Why nobody can be heard, in words; empty if one can. A guard goes on without.
+    """
 
     def __init__(self, path: Path) -> None:
-        path.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
-        self._socket.bind(str(path))
-        path.chmod(0o600)
-        self.malformed = 0
+        self.malformed, self.refusal = 0, ""
+        try:
+            path.unlink(missing_ok=True)
+            self._socket.bind(str(path))
+            path.chmod(0o600)
+        except OSError as error:
+            self.refusal = f"{path}: {error.strerror}: nobody can ask for anything"
 
     def poll(self) -> list[tuple[dict[str, Any], str]]:
         """Requests that wait, at most `DRAIN`, each with the address for its answer."""

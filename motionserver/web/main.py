@@ -11,7 +11,9 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
+from motionserver.telemetry.oom import HELPER, set_oom_score
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.run_files import located
 from motionserver.web.config import WebConfig, WebConfigError, read_config
 from motionserver.web.connection import PatientLoop, PatientProtocol
 from motionserver.web.wiring import wired_app
@@ -68,7 +70,8 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write("usage: python -m motionserver.web <configuration.json>\n")
         return 2
     try:
-        config = read_config(Path(arguments[0]))
+        path = Path(arguments[0])
+        config = read_config(located(path.parent, path.name))
         config.check()
         app = wired_app(config)
     except WebConfigError as error:
@@ -76,5 +79,6 @@ def main(arguments: list[str]) -> int:
         return 2
     follow_parent()
     os.nice(_NICENESS)
+    set_oom_score(HELPER)
     server(app, config).run()
     return 0

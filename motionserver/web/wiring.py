@@ -11,6 +11,7 @@ from fastapi import FastAPI
 
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.requests import ask
+from motionserver.telemetry.run_files import located
 from motionserver.web.app import build_app
 from motionserver.web.config import WebConfig
 from motionserver.web.heart import Heart
@@ -61,10 +62,10 @@ def wired_app(config: WebConfig) -> FastAPI:
     folder = config.run_dir
     return build_app(
         config,
-        MappedSnapshot(folder / GUARD_SNAPSHOT),
-        MappedSnapshot(folder / PLANNER_SNAPSHOT),
-        MappedSnapshot(folder / SERVICE_SNAPSHOT),
+        MappedSnapshot(located(folder, GUARD_SNAPSHOT)),
+        MappedSnapshot(located(folder, PLANNER_SNAPSHOT)),
+        MappedSnapshot(located(folder, SERVICE_SNAPSHOT)),
         partial(ask, folder / GUARD_REQUESTS, timeout=_PATIENCE),
         partial(ask, folder / PLANNER_REQUESTS, timeout=_PATIENCE),
-        beat=Heart(folder / SIGN_OF_LIFE).beat,
+        beat=Heart(located(folder, SIGN_OF_LIFE)).beat,
     )

@@ -283,9 +283,11 @@ def test_a_step_too_fast_for_its_time_is_convicted_by_leg():
     assert told["wall_speed_max"] == pytest.approx(2.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("lateness", [0.0, 0.002, 0.003])
-def test_a_little_lateness_is_no_offence_in_wall_time(lateness):
-    assert verdict(at_instants(with_one_late(lateness)))["violations"] == 0
+@pytest.mark.parametrize(("lateness", "too_close"), [(0.0, 0), (0.003, 0), (0.006, 1)])
+def test_what_a_network_may_do_is_no_offence_in_wall_time(lateness, too_close):
+    told = verdict(at_instants(with_one_late(lateness)))
+    assert told["violations"] == 0
+    assert told["commands_too_close"] == too_close
 
 
 @pytest.mark.parametrize(

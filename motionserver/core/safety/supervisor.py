@@ -44,6 +44,7 @@ class Supervisor:
         # after a gap of our own, plans are waited for anew, once: (accepted, resumed) [ns]
         self._excused = (-1, 0)
         self.inconsistent = ""
+        self.leave_reason = ""
         self.astray = False
 
     def heard(self, now_ns: int, status: CueStatus | None, gap: float) -> None:
@@ -162,6 +163,8 @@ class Supervisor:
         newest = self.device.newest
         if event is Event.INCONSISTENT:
             return self.inconsistent
+        if event is Event.PARK and self.leave_reason:
+            return f"the service is ending: {self.leave_reason}"
         if event is Event.DEVICE_FAULT and newest is not None:
             return f"the device reports {', '.join(newest.faults) or newest.state}"
         if event is Event.FEEDBACK_LOST:

@@ -17,7 +17,9 @@ from motionserver.telemetry.blackbox.room import FOLDER, free_memory
 from motionserver.telemetry.blackbox.watch import Watch
 from motionserver.telemetry.link import GuardClock
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.oom import HELPER, set_oom_score
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.run_files import located
 from motionserver.telemetry.signals import ignore_signals, let_through
 
 POLL: Final = 0.1
@@ -43,11 +45,12 @@ def main() -> int:
     follow_parent()
     with contextlib.suppress(OSError):
         os.nice(_POLITE)
+    set_oom_score(HELPER)
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, folder, kept = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     watch = Watch(run_dir, folder, kept, lambda: datetime.now(UTC))
     room = (run_dir / FOLDER).resolve()
-    clock = MappedFile(run_dir / "clock.map")
+    clock = MappedFile(located(run_dir, "clock.map"))
     while not told and os.getppid() == parent:
         watch.look(time.monotonic_ns())
         watch.tell(time.monotonic_ns(), os.getpid())

@@ -20,6 +20,7 @@ from motionserver.telemetry.blackbox.history import open_history
 from motionserver.telemetry.blackbox.records import GUARD, KEPT, PACKET, Layout
 from motionserver.telemetry.blackbox.room import FOLDER
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.run_files import located, read_run_file
 from motionserver.telemetry.trace import Trace
 
 FORMAT: Final = "motionserver blackbox 1"
@@ -27,6 +28,7 @@ SUFFIX: Final = ".json.gz"
 _PART: Final = ".part"
 _NAME: Final = re.compile(r"\d{8}T\d{6}\.\d{3}Z-[a-z0-9-]*\.json\.gz(\.part)?")
 """Name of a dump, or of the part of one; nothing else in its folder is ever deleted."""
+_SHOWN: Final = ("guard", "planner", "service")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,10 @@ def collect(
         now_ns: Now, CLOCK_MONOTONIC [ns].
         utc: The same instant by the wall clock.
     """
-    box = run_dir / FOLDER
+
+    def box(name: str) -> Path:
+        return located(run_dir, f"{FOLDER}/{name}.history")
+
     since = min(trigger.t_ns for trigger in triggers) - int(KEPT * 1e9)
     return {
         "format": FORMAT,
@@ -64,14 +69,14 @@ def collect(
         "made_ns": now_ns,
         "reasons": [{"t_ns": one.t_ns, "text": one.text} for one in triggers],
         "config": _config(run_dir),
-        **{name: _shown(run_dir / f"{name}.map") for name in ("guard", "planner", "service")},
-        "guard_rows": _table(box / "guard.history", GUARD, since),
-        "packets": _table(box / "packets.history", PACKET, since),
-        "periods": _objects(box / "periods.history", _period, since),
-        "guard_events": _objects(box / "guard_events.history", json.loads, since),
-        "planner_events": _objects(box / "planner_events.history", json.loads, since),
-        "accepted": _objects(box / "accepted.history", _plan, 0),
-        "proposed": _objects(box / "proposed.history", _plan, 0),
+        **{name: _shown(located(run_dir, f"{name}.map")) for name in _SHOWN},
+        "guard_rows": _table(box("guard"), GUARD, since),
+        "packets": _table(box("packets"), PACKET, since),
+        "periods": _objects(box("periods"), _period, since),
+        "guard_events": _objects(box("guard_events"), json.loads, since),
+        "planner_events": _objects(box("planner_events"), json.loads, since),
+        "accepted": _objects(box("accepted"), _plan, 0),
+        "proposed": _objects(box("proposed"), _plan, 0),
     }
 
 
@@ -125,7 +130,7 @@ def _shown(path: Path) -> Any:  # noqa: ANN401  (any JSON)
 def _config(run_dir: Path) -> Any:  # noqa: ANN401  (any JSON)
     """What the processes were told, without the keys that sign packets."""
     try:
-        data = json.loads((run_dir / "config.json").read_text("utf-8"))
+        data = json.loads(read_run_file(run_dir, "config.json"))
         for source in data["sources"]:
             source["key"] = "set" if source["key"] else ""
     except (OSError, ValueError, LookupError, TypeError):

@@ -17,6 +17,7 @@ from motionserver.core.safety.states import State
 from motionserver.telemetry.blackbox.history import open_history
 from motionserver.telemetry.blackbox.records import GUARD, ORDERS, PHASES, STATES, VERDICTS
 from motionserver.telemetry.blackbox.room import FOLDER
+from motionserver.telemetry.run_files import located
 
 COUNT_NS: Final = 1_000_000_000
 """Time between two notes of all counters [ns]."""
@@ -35,11 +36,10 @@ class GuardBox:
     """
 
     def __init__(self, run_dir: Path, guard: Guard) -> None:
-        folder = run_dir / FOLDER
         self._guard = guard
-        self._rows = open_history(folder / "guard.history")
-        self._events = open_history(folder / "guard_events.history")
-        self._plans = open_history(folder / "accepted.history")
+        self._rows = open_history(located(run_dir, f"{FOLDER}/guard.history"))
+        self._events = open_history(located(run_dir, f"{FOLDER}/guard_events.history"))
+        self._plans = open_history(located(run_dir, f"{FOLDER}/accepted.history"))
         self._state: State | None = None
         self._seen_event = 0
         self._late_ns = self._ticks = 0

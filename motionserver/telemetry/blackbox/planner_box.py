@@ -13,6 +13,7 @@ from motionserver.core.state import VehicleMotion
 from motionserver.telemetry.blackbox.history import History, open_history
 from motionserver.telemetry.blackbox.records import PACKET
 from motionserver.telemetry.blackbox.room import FOLDER
+from motionserver.telemetry.run_files import located
 
 COUNT_NS: Final = 1_000_000_000
 """Time between two notes of all counters [ns]."""
@@ -27,11 +28,10 @@ class PlannerBox:
     """
 
     def __init__(self, run_dir: Path) -> None:
-        folder = run_dir / FOLDER
-        self._packets = open_history(folder / "packets.history")
-        self._periods = open_history(folder / "periods.history")
-        self._proposed = open_history(folder / "proposed.history")
-        self._events = open_history(folder / "planner_events.history")
+        self._packets = open_history(located(run_dir, f"{FOLDER}/packets.history"))
+        self._periods = open_history(located(run_dir, f"{FOLDER}/periods.history"))
+        self._proposed = open_history(located(run_dir, f"{FOLDER}/proposed.history"))
+        self._events = open_history(located(run_dir, f"{FOLDER}/planner_events.history"))
         self._counted_ns = 0
         self._unreadable = 0
 

@@ -18,13 +18,14 @@ from motionserver.telemetry.blackbox.history import open_history
 from motionserver.telemetry.blackbox.records import KEPT
 from motionserver.telemetry.blackbox.room import FOLDER
 from motionserver.telemetry.mapped import MappedFile
+from motionserver.telemetry.run_files import located
 
 AFTER_NS: Final = 1_000_000_000
 """What follows a fault is kept as well [ns]."""
 SPACING_NS: Final = int(KEPT * 1e9)
 """A process that dies again and again: its dumps join without a gap and without an overlap [ns]."""
 WRITTEN: Final = frozenset({State.FAULT, State.SAFE})
-_STATUS_BYTES: Final = 4096
+STATUS_BYTES: Final = 4096
 _WEIGHT: Final = tuple(
     f"died-{who}" for who in ("guard", "service", "planner", "spare-guard", "web", "black-box")
 )
@@ -52,9 +53,9 @@ class Watch:
 
     def __init__(self, run_dir: Path, folder: Path, kept: int, utc: Callable[[], datetime]) -> None:
         self._run_dir, self._folder, self._kept, self._utc = run_dir, folder, kept, utc
-        self._events = open_history(run_dir / FOLDER / "guard_events.history")
-        self._service = MappedFile(run_dir / "service.map")
-        self._status = MappedFile(run_dir / "blackbox.map", _STATUS_BYTES)
+        self._events = open_history(located(run_dir, f"{FOLDER}/guard_events.history"))
+        self._service = MappedFile(located(run_dir, "service.map"))
+        self._status = MappedFile(located(run_dir, "blackbox.map"), STATUS_BYTES)
         self._pending: list[_Pending] = []
         self._dumped_ns: dict[str, int] = {}
         self._seen_event = self._seen_death_ns = 0

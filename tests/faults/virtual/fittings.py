@@ -64,7 +64,7 @@ class Requests:
     """A request socket: bounded as the kernel's, a few served per tick, answers kept."""
 
     def __init__(self):
-        self.malformed = 0
+        self.malformed, self.refusal = 0, ""
         self.dropped = 0
         self.answers = deque(maxlen=1000)
         self._waiting = deque()
