@@ -10,7 +10,7 @@ import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from motionserver.errors import MotionServerError
 from motionserver.settings.config import Config, load_config, run_dir_of, state_dir_of
