@@ -118,11 +118,16 @@ def test_a_process_that_has_just_started_is_ended_by_no_signal(tmp_path: Path) -
     """Between exec and its own handlers, too: a spare that is replaced is never without cover."""
     with FarRig(tmp_path) as rig:
         rig.wait_state("PARKED")
-        rig.wait_for(lambda: is_loaded(rig.pid("spare")), "the spare to be loaded")
+        for name in ("spare", "reserve"):
+            rig.wait_for(lambda name=name: is_loaded(rig.pid(name)), f"the {name} to be loaded")
+        before = {rig.pid(name) for name in ("guard", "spare", "reserve")}
         old = rig.pid("spare")
         assert old is not None
         os.kill(old, signal.SIGKILL)
-        new = rig.wait_for(lambda: rig.pid("spare") not in (None, old) and rig.pid("spare"), "one")
+        # the reserve is the spare now, and the one that starts is the reserve
+        rig.wait_for(lambda: rig.pid("reserve") not in (None, *before), "another reserve")
+        new = rig.pid("reserve")
+        assert new is not None
         early = 0
         while not is_loaded(new):
             # SIGTERM is remembered: it parks once the turn comes
@@ -132,7 +137,7 @@ def test_a_process_that_has_just_started_is_ended_by_no_signal(tmp_path: Path) -
             assert is_alive(new)
             time.sleep(0.01)
         assert early > 3
-        assert rig.pid("spare") == new
+        assert rig.pid("reserve") == new
         assert rig.end() == 0
     with contextlib.suppress(OSError):
         rig.verdict()
