@@ -12,7 +12,7 @@ from motionserver.doctor.mends import RUN_DIR
 from motionserver.doctor.tree import Tree
 from motionserver.supervisor.rundir import LONGEST_PATH, MARKER, foreign_content
 
-RUN_SPACE: Final = 8 << 20
+RUN_SPACE: Final = 16 << 20
 """Free bytes for a run: a page of a mapped file that finds none kills its process."""
 STATE_SPACE: Final = 64 << 20
 """Free bytes for audit, presets and recordings' heads."""

@@ -46,10 +46,10 @@ STATE = replace(RUN, path=Path("/var/lib/motionserver"), kind="ext4")
             {"writable": False, "exists": False}, Level.PROBLEM,
             "/run/motionserver cannot be made", "sudo install -d",
         ),
-        ({"free": RUN_SPACE}, Level.OK, "/run/motionserver: tmpfs, 8 MiB free", ""),
+        ({"free": RUN_SPACE}, Level.OK, "/run/motionserver: tmpfs, 16 MiB free", ""),
         (
             {"free": RUN_SPACE - (1 << 20)}, Level.PROBLEM,
-            "/run/motionserver: tmpfs, 7 MiB free, 8 MiB needed", "df -h /run/motionserver",
+            "/run/motionserver: tmpfs, 15 MiB free, 16 MiB needed", "df -h /run/motionserver",
         ),
         (
             {"path": Path("/run/" + "x" * 66)}, Level.PROBLEM,

@@ -16,11 +16,16 @@ from motion_protocol import (
     Mode,
     Motion,
     NotFiniteError,
+    Notices,
+    PlatformState,
     Preview,
     Reference,
     SizeError,
+    Status,
     decode_cue,
+    decode_status,
     encode_cue,
+    encode_status,
 )
 from motion_protocol.blocks import DRIVER_LAYOUT, MOTION_LAYOUT, PREVIEW, PREVIEW_LAYOUT
 from motion_protocol.cue import CUE
@@ -152,3 +157,11 @@ def test_every_point_of_reference_has_its_number():
         "UNSPECIFIED", "CENTRE_OF_GRAVITY", "SEAT", "CAB", "HEAD", "PLATFORM",
     ]  # fmt: skip
     assert [point.value for point in Reference] == [0, 1, 2, 3, 4, 5]
+
+
+def test_notice_text_of_240_bytes_is_written_and_one_more_is_not():
+    status = Status(*range(1, 12), 0.5, PlatformState.RUN, notices=Notices.TOO_SLOW)
+    longest = replace(status, notice_text="é" * 120)
+    assert decode_status(encode_status(longest)).notice_text == "é" * 120
+    with pytest.raises(FieldError, match=r"notice.text has 241 bytes, at most 240 fit"):
+        encode_status(replace(status, notice_text="é" * 120 + "e"))
