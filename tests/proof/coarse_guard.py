@@ -46,6 +46,7 @@ def patience(lowering, raising):
         gap=2.0,
         reset=1.5,
         track_time=0.5,
+        spared=1.0,
     )
 
 
@@ -85,7 +86,10 @@ _RECORD = (
     "sent_legs",
 )
 _DECISION = ("_since", "_settles", "_seen_ns", "_phase", "status", "is_blocked")
-_SUPERVISOR = ("inconsistent", "astray", "_paused_ns", "_excused")
+_SUPERVISOR = (
+    *("inconsistent", "astray", "_paused_ns", "_excused"),
+    *("_hold_ns", "_spared_ns", "_looked_ns", "_was_held"),
+)
 _SOURCE = ("status", "_driving_since", "_silent_since")
 _DEVICE = (
     *("newest", "_valid_since", "_astray_since", "_excused", "_excused_ns"),
@@ -251,7 +255,9 @@ class CoarseGuard:
     def sign(self, node):
         """What tells this node from others: ages in ticks, and only where they are read."""
         state, since, playback, deadline, accepted, reset, leaving, engaged_once, sent = node.record
-        inconsistent, astray, paused, (excused_of, resumed) = node.supervisor
+        inconsistent, astray, paused, (excused_of, resumed), hold, spared, _, was_held = (
+            node.supervisor
+        )
         status, driving, silent = node.source
         newest, valid, off, excused, excused_ns, still_at, still_since, sound = node.device
         now = node.now
@@ -282,7 +288,14 @@ class CoarseGuard:
                 _age(now, driving, 1) if fresh else None,
                 _age(now, silent, 2),
             )
-        held = (_age(now, since, 3), _age(now, max(since, paused), 2))
+        counts = max(since, paused)
+        spared = spared if hold == counts else 0
+        held = (
+            _age(now, since, 3),
+            _age(now, counts + spared, 2),
+            spared,
+            was_held and hold == counts,
+        )
         returns = None
         if latched:
             waits, settles, seen, phase, _, is_blocked = node.decision

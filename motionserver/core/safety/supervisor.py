@@ -41,6 +41,9 @@ class Supervisor:
         self._no_plan_ns = int(patience.plans * plan_period * SECOND)
         self._gap = 2.0 * send_period
         self._paused_ns = 0
+        # since when a hold counts, what of it had no reason any more, when that was looked at [ns]
+        self._hold_ns = self._spared_ns = self._looked_ns = 0
+        self._was_held = False
         # after a gap of our own, plans are waited for anew, once: (accepted, resumed) [ns]
         self._excused = (-1, 0)
         self.inconsistent = ""
@@ -141,7 +144,17 @@ class Supervisor:
             self._paused_ns = now_ns
         held = (now_ns - record.since_ns) / SECOND
         # what follows a pause has the patience of a hold that begins when the pause ends
-        waited = (now_ns - max(record.since_ns, self._paused_ns)) / SECOND
+        hold = max(record.since_ns, self._paused_ns)
+        if hold != self._hold_ns:
+            self._hold_ns, self._spared_ns, self._was_held = hold, 0, False
+        elif not fresh or not planned:
+            self._was_held = True
+        elif self._was_held:
+            # its reason is gone, and only the source's half second is waited for
+            spared = self._spared_ns + now_ns - self._looked_ns
+            self._spared_ns = min(spared, int(patience.spared * SECOND))
+        self._looked_ns = now_ns
+        waited = (now_ns - hold - self._spared_ns) / SECOND
         if waited > patience.hold or (pausing and held > patience.pause):
             yield Event.HOLD_EXPIRED
         if source.silent_for(now_ns) > patience.silence:

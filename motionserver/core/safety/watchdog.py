@@ -25,7 +25,8 @@ class Patience:
         feedback: Silence of the device while raised; at least six of its periods.
         fresh: Source without a break before it moves the platform.
         plans: Planner periods without an accepted plan.
-        hold: Longest hold.
+        hold: Longest hold, as long as its reason lasts.
+        spared: Longest part of a hold that is not counted because its reason is gone.
         pause: Longest hold of a source that says it pauses.
         silence: Longest wait for a source while ready.
         raising: Longest lift.
@@ -57,6 +58,7 @@ class Patience:
     still: float = 0.3
     quiver: float = 0.002
     sound: float = 1.0
+    spared: float = 8.0
 
 
 @dataclass(frozen=True, slots=True)

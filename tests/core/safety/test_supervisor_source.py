@@ -275,3 +275,44 @@ def test_a_supervisor_begins_without_a_complaint():
 )
 def test_the_side_that_is_late_is_named_with_its_age(status, said):
     assert source_reason(status, 10_000 * MS) == said
+
+
+def outage(seconds, pattern=None):
+    """A drive whose source is silent for so long, then as ``pattern`` says [ms on, ms off]."""
+    scene = Scene()
+    states, begun = [], scene.now
+
+    def let(ms, sends):
+        scene.sends = sends
+        for _ in range(ms // 10):
+            followed = scene.tick()
+            if followed is not None:
+                scene.record.state, scene.record.since_ns = followed[0], scene.now
+                states.append((followed[0], (scene.now - begun) / 1e9))
+
+    let(round(seconds * 1000), False)
+    for _ in range(200 if pattern else 1):
+        on, off = pattern or (3000, 0)
+        let(on, True)
+        let(off, False)
+        if states[-1][0] is State.PARKING:
+            break
+    return states
+
+
+@pytest.mark.parametrize("seconds", [0.2, 1.6, 2.1])
+def test_an_outage_that_is_over_before_the_hold_has_run_out_does_not_park(seconds):
+    assert [state for state, _ in outage(seconds)] == [State.HOLD, State.RUN]
+
+
+def test_an_outage_that_is_longer_than_a_hold_parks():
+    (_, held), (state, parked) = outage(2.5)
+    assert state is State.PARKING
+    assert parked - held == pytest.approx(2.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("pattern", "most"), [((100, 400), 4.5), ((300, 200), 10.1)])
+def test_a_source_that_comes_and_goes_parks_in_the_end(pattern, most):
+    (_, held), (state, parked) = outage(0.2, pattern)
+    assert state is State.PARKING
+    assert 2.0 < parked - held <= most

@@ -259,6 +259,7 @@ def test_how_long_each_silence_is_borne():
         "still": 0.3,
         "quiver": 0.002,
         "sound": 1.0,
+        "spared": 8.0,
     }
 
 
