@@ -373,3 +373,46 @@ def test_the_first_step_home_is_within_a_hair_of_where_it_stood():
         b.tick()
     assert np.abs(b.sent[-1].legs - b.sent[-2].legs).max() < 1e-3
     assert lengths(b.machine, b.sent[-1].state.pose)[0] == pytest.approx(b.sent[-1].legs)
+
+
+def test_a_device_that_measures_nothing_and_was_sent_nowhere_is_not_moved():
+    b = Bench(compact())
+    b.device.mute = True
+    b.device.put_up(np.zeros(6))
+    b.until("FAULT", 1.0)
+    b.run(3.0)
+    assert orders(b) == [Order.WAIT]
+    assert "cannot go home by itself: the device measures neither legs nor pose" in b.guard.reason
+    assert sum("cannot go home" in text for _, text in b.record.events) == 1
+
+
+def test_a_device_that_still_moves_where_nothing_was_played_is_waited_for():
+    b = Bench(compact())
+    b.device.put_up(np.array([0.03, 0.0, 0.02, 0.0, 0.0, 0.0]))
+    take, b.device.take = b.device.take, lambda setpoint: None
+    b.device.faults = ("watchdog",)
+    b.until("FAULT", 0.1)
+    b.device.faults = ()
+    b.run(0.05)
+    b.device.take = take
+    begin, frames = np.array(b.device.legs), len(b.sent)
+    for k in range(480):
+        b.device.legs = begin + 0.01 * np.sin(0.1 * k)
+        b.tick()
+    assert orders(b, frames) == [Order.WAIT]
+    b.device.legs = begin
+    comes_down(b)
+
+
+def test_a_device_that_says_up_while_it_settles_is_told_to_park_until_it_is_down():
+    b = faulted()
+    while b.sent[-1].order is not Order.PARK:
+        b.tick()
+    b.device.phase, frames = Phase.UP, len(b.sent)
+    b.device.take = lambda setpoint: None
+    for k in range(120):
+        b.device.legs = b.device.neutral - 0.001 * k
+        b.tick()
+    assert orders(b, frames) == [Order.PARK]
+    b.device.phase, b.device.legs = Phase.DOWN, b.device.low
+    comes_down(b)

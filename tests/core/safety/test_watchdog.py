@@ -283,3 +283,14 @@ def test_a_source_drives_or_is_silent():
     source.update(2161 * MS, None)
     assert source.driving_for(2161 * MS) == 0.0
     assert not source.is_fresh(2161 * MS)
+
+
+def test_answers_are_sound_from_the_first_without_a_fault_until_they_are_missing():
+    watch = DeviceWatch(compact(), Patience(), 1 / 60)
+    assert watch.sound_for(0) == 0.0
+    for ms, faults in ((1000, ("bus",)), (1050, ()), (1100, ())):
+        watch.answered(Feedback(ms * MS, Phase.UP, "UP", faults=faults))
+    assert watch.sound_for(1150 * MS) == pytest.approx(0.1)
+    assert watch.sound_for(1201 * MS) == 0.0
+    watch.answered(Feedback(1300 * MS, Phase.UP, "UP"))
+    assert watch.sound_for(1350 * MS) == pytest.approx(0.05)
