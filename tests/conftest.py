@@ -11,10 +11,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 settings.register_profile("house", deadline=None, derandomize=True)
 settings.load_profile("house")
 
-PROCESSES = "processes"
-"""Tests that start processes of their own: one after the other, on one worker."""
-_STARTERS = {"subprocess", "rig", "web_process", "cabled", "far_ends"}
-"""Modules whose use in a test module means that it starts processes."""
+
+@pytest.fixture
+def tmp_path(tmp_path_factory):
+    """A folder with a short path: a unix socket's has room for 107 bytes."""
+    return tmp_path_factory.mktemp("t")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -24,23 +25,9 @@ def pytest_cmdline_main(config):
         config.option.numprocesses, config.option.dist, config.option.tx = 0, "no", []
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Put the tests that start processes into one group."""
-    starts = {}
-    for item in items:
-        module = item.module
-        if module not in starts:
-            starts[module] = starts_processes(module)
-        if starts[module]:
-            item.add_marker(pytest.mark.xdist_group(PROCESSES))
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Spread the tests over the workers, those of real processes on one of them."""
+    from worker_schedule import ProcessesTogether
 
-
-def starts_processes(module):
-    """True if a test module uses what starts processes."""
-    used = {name for value in vars(module).values() for name in _home(value)}
-    return not used.isdisjoint(_STARTERS)
-
-
-def _home(value):
-    return {getattr(value, "__module__", None), getattr(value, "__name__", None)}
+    return ProcessesTogether(config, log)
