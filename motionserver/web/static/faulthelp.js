@@ -4,8 +4,8 @@ import { byId, put } from "./dom.js";
 
 const AGAIN_MS = 3000;
 const STEPS = {
-  FAULT: "Nothing is cued any more. Remove the cause named above. Once the device answers without a fault, an operator presses Reset; until then engaging is not possible.",
-  SAFE: "The emergency stop or an interlock is open: the device decides, nothing is sent against it. Close it, then an operator presses Reset.",
+  FAULT: "Nothing is cued any more. Once the device has answered for a second without a fault where it was sent, the platform comes home and parks by itself. Remove the cause named above, then an operator presses Reset; until then engaging is not possible.",
+  SAFE: "The emergency stop or an interlock is open: it is followed, nothing is sent against it. Close it, then an operator presses Reset.",
 };
 
 export class FaultHelp {
