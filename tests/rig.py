@@ -1,6 +1,7 @@
 """A whole server in real processes, an emulated base beside it, and hands to hurt both."""
 
 import asyncio
+import atexit
 import contextlib
 import json
 import os
@@ -9,6 +10,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -19,6 +21,7 @@ import tomli_w
 from motion_clients.flawed_link import LinkFlaws
 from motion_clients.force_sender import ForceSender
 from motion_clients.moog_emulator import Emulator
+from motion_clients.moog_judged import JudgedLimits
 from motion_clients.motion_log import MotionLog
 from motion_clients.recording import recording_path
 from motion_clients.replay import replay
@@ -27,6 +30,9 @@ from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.requests import RequestError, ask
 
 ROOT = Path(__file__).parent.parent
+LOGIN = os.environ.get("XDG_RUNTIME_DIR")
+RUNTIME = tempfile.TemporaryDirectory(prefix="motion-", ignore_cleanup_errors=True)
+atexit.register(RUNTIME.cleanup)
 PATIENCE = 60.0
 """Longest wait for anything [s]: the machine may be busy; a wait that ends early costs nothing."""
 _ARROW = re.compile(r"motionserver\.guard (\w+) -> (\w+): ")
@@ -60,6 +66,9 @@ def unhurried() -> None:
 def environment() -> dict[str, str]:
     paths = [str(ROOT / name) for name in ("", "protocol", "clients")]
     kept = {k: v for k, v in os.environ.items() if not k.startswith("MOTIONSERVER_")}
+    if kept.get("XDG_RUNTIME_DIR") == LOGIN:
+        # servers announce themselves there: this worker sees its own alone
+        kept["XDG_RUNTIME_DIR"] = RUNTIME.name
     return {**kept, "PYTHONPATH": os.pathsep.join(paths)}
 
 
@@ -99,8 +108,11 @@ def is_alive(pid: int) -> bool:
 class Base:
     """An emulated base on a loop of its own."""
 
-    def __init__(self, log: Path, force_to: tuple[str, int] | None) -> None:
+    def __init__(
+        self, log: Path, force_to: tuple[str, int] | None = None, may_lose: bool = False
+    ) -> None:
         self._log_path, self._force_to = log, force_to
+        self._limits = JudgedLimits(may_lose=may_lose)
         self._loop = asyncio.new_event_loop()
         self._done = asyncio.Event()
         self._ready = threading.Event()
@@ -122,7 +134,7 @@ class Base:
             sender = None
             if self._force_to is not None:
                 sender = stack.enter_context(contextlib.closing(ForceSender(self._force_to)))
-            self.emulator = Emulator(log=log, send_force=sender)
+            self.emulator = Emulator(log=log, send_force=sender, limits=self._limits)
             async with self.emulator:
                 self.port = self.emulator.address[1]
                 self._ready.set()

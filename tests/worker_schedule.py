@@ -1,4 +1,4 @@
-"""How tests are spread over workers: those that start processes run one after the other.
+"""How tests are spread over workers: those of a file that starts processes stay together.
 
 Written here because the groups of pytest-xdist 3.8 have no effect with pytest 9.2, which makes a
 test's name from its place.
@@ -10,7 +10,6 @@ from pathlib import Path
 
 from xdist.scheduler import LoadScopeScheduling
 
-PROCESSES = "tests that start processes"
 STARTERS = re.compile(
     r"^ *(?:from|import) (?:subprocess|rig|web_process|cabled|far_ends|browser\.chromium)\b", re.M
 )
@@ -19,10 +18,14 @@ ROOT = Path(__file__).parents[1]
 
 
 class ProcessesTogether(LoadScopeScheduling):
-    """Gives one worker all tests of real processes, and hands out every other test by itself."""
+    """Hands out whole files of tests of real processes, and every other test by itself.
+
+    Such tests mostly wait: with all of them on one worker of two the other one is done long before.
+    """
 
     def _split_scope(self, nodeid: str) -> str:
-        return PROCESSES if starts_processes(nodeid.partition("::")[0]) else nodeid
+        path = nodeid.partition("::")[0]
+        return path if starts_processes(path) else nodeid
 
 
 @cache

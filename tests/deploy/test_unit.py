@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from motionserver.supervisor.service import PARK_PATIENCE
+from motionserver.supervisor.guards import PARK_PATIENCE
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 UNIT = DEPLOY / "motionserver.service"

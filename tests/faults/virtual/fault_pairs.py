@@ -2,7 +2,7 @@
 
 from random import Random
 
-from faults import pairs
+from fault_list import pairs
 
 
 def pairs_of(seed, count):

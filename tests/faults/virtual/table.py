@@ -5,7 +5,7 @@ import statistics
 import sys
 from pathlib import Path
 
-from faults import FAULTS, FORESEEN
+from fault_list import FAULTS, FORESEEN
 
 HEAD = """# What can go wrong, and what was measured
 

@@ -4,8 +4,8 @@ from functools import cache
 
 import pytest
 from account import Account
+from fault_list import FAULTS
 from fault_pairs import pairs_of
-from faults import FAULTS
 from fittings import fitted
 from scenario import Scene
 from table import markdown

@@ -17,8 +17,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from fault_list import FAULTS, FORESEEN
 from fault_pairs import pairs_of
-from faults import FAULTS, FORESEEN
 from scenario import Scene
 
 SECONDS = 30.0

@@ -3,15 +3,15 @@
 from pathlib import Path
 
 import pytest
-from faults import FAULTS
+from fault_list import FAULTS
 
 from motionserver.guard.ports import DRAIN as GUARD_DATAGRAMS
 from motionserver.planner.crowd import CALM_NS, MANY
 from motionserver.settings.key_file import SHORTEST_KEY
 from motionserver.sources.udp import BUFFER
 from motionserver.sources.udp import DRAIN as DATAGRAMS
+from motionserver.supervisor.guards import PARK_PATIENCE
 from motionserver.supervisor.rundir import MARKER
-from motionserver.supervisor.service import PARK_PATIENCE
 
 ROOT = Path(__file__).parents[3]
 
