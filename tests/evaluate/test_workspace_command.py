@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 from motionserver.cli.commands import app
 from motionserver.core.axes import frozen
+from motionserver.core.kinematics.reach import Ending, Limit
 from motionserver.errors import ConfigError
 from motionserver.evaluate.workspace.advice import advice, smallest_whole
 from motionserver.evaluate.workspace.command import workspace_text
 from motionserver.evaluate.workspace.draw import planes_file, printed
 from motionserver.evaluate.workspace.page import to_html
-from motionserver.evaluate.workspace.reach import Ending, Limit
 from motionserver.evaluate.workspace.survey import survey
 from motionserver.evaluate.workspace.table import to_text
 from motionserver.evaluate.workspace.words import lopsided

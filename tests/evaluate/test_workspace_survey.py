@@ -11,10 +11,10 @@ from machines import compact, science_fit
 
 from motionserver.core.axes import frozen
 from motionserver.core.kinematics.hexapod import conditioning, neutral_conditioning
+from motionserver.core.kinematics.reach import Limit, first_exits, reachable
 from motionserver.core.safety.verify import GUARD_MARGINS, check_ways_home
 from motionserver.errors import ConfigError
 from motionserver.evaluate.workspace.homing import shares, stranded
-from motionserver.evaluate.workspace.reach import Limit, first_exits, reachable
 from motionserver.evaluate.workspace.survey import PAIRS, survey
 
 STROKE_ONLY = replace(compact(), joint_angle=None, conditioning=None)

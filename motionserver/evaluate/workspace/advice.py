@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import Array
-from motionserver.evaluate.workspace.reach import Limit
+from motionserver.core.kinematics.reach import Limit
 from motionserver.evaluate.workspace.result import Range, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from motionserver.core.axes import AXIS_NAMES, Array
+from motionserver.core.kinematics.reach import Ending
 from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
 from motionserver.evaluate.workspace.advice import Advice, advice
 from motionserver.evaluate.workspace.draw import planes_file
 from motionserver.evaluate.workspace.page import to_html
-from motionserver.evaluate.workspace.reach import Ending
 from motionserver.evaluate.workspace.result import Corner, Range, Survey
 from motionserver.evaluate.workspace.survey import survey
 from motionserver.evaluate.workspace.table import to_text

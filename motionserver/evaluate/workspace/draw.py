@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from motionserver.core.axes import AXIS_NAMES, Array
-from motionserver.evaluate.workspace.reach import Ending, Limit
+from motionserver.core.kinematics.reach import Ending, Limit
 from motionserver.evaluate.workspace.result import Corner, Plane, Survey
 from motionserver.evaluate.workspace.words import TOWARDS, amount, corner_of
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from motionserver.core.axes import Array, Axis, Bools, frozen
 from motionserver.core.kinematics.hexapod import leg_lengths
+from motionserver.core.kinematics.reach import posture_allowed, reachable
 from motionserver.core.limits import Machine
-from motionserver.evaluate.workspace.reach import posture_allowed, reachable
 
 FACTORS: Final = (1.0, 0.5, 0.3)
 """Sizes of the box, as shares of the whole."""

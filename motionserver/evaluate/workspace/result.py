@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from motionserver.core.axes import AXIS_NAMES, Array
+from motionserver.core.kinematics.reach import Ending
 from motionserver.core.limits import Machine
 from motionserver.evaluate.workspace.homing import Share
-from motionserver.evaluate.workspace.reach import Ending
 
 
 @dataclass(frozen=True, slots=True)

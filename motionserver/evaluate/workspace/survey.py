@@ -9,10 +9,10 @@ import numpy as np
 
 from motionserver.core.axes import Array
 from motionserver.core.kinematics.hexapod import conditioning, joint_angles, neutral_conditioning
+from motionserver.core.kinematics.reach import Exits, first_exits, reachable
 from motionserver.core.limits import Machine
 from motionserver.errors import ConfigError
 from motionserver.evaluate.workspace.homing import FEW, park_higher, shares
-from motionserver.evaluate.workspace.reach import Exits, first_exits, reachable
 from motionserver.evaluate.workspace.result import Corner, Extreme, Plane, Range, Survey
 
 RAYS: Final = 72
