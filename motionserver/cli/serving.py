@@ -42,6 +42,7 @@ from motionserver.supervisor.addresses import try_way
 from motionserver.supervisor.rundir import refuse_foreign
 from motionserver.supervisor.service import Service
 from motionserver.telemetry.link import Maps
+from motionserver.telemetry.log_output import start_log
 from motionserver.telemetry.requests import RequestError, ask
 from motionserver.telemetry.signals import PARKING, ignore_signals
 from motionserver.web.config import config_from
@@ -51,9 +52,7 @@ def serve(path: Path, dry_run: bool) -> int:
     """Run a server until a signal; returns its exit status."""
     ignore_signals(but=PARKING)
     config = load_config(path)
-    logging.basicConfig(
-        level=config.server.log_level.upper(), format="%(asctime)s %(name)s %(message)s"
-    )
+    start_log(config.server.log_level.upper())
     log = logging.getLogger("motionserver.supervisor")
     run_dir = run_dir_of(config)
     resolved = resolve(config, run_dir, dry_run)

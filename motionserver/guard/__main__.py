@@ -6,15 +6,16 @@ import asyncio
 import contextlib
 import fcntl
 import gc
-import logging
 import os
 import signal
 import sys
 from pathlib import Path
+from typing import Final
 
 from motionserver.guard.loop import GuardLoop
 from motionserver.guard.options import read_options
 from motionserver.guard.ports import open_link
+from motionserver.telemetry.log_output import start_log
 from motionserver.telemetry.memory import lock_memory
 from motionserver.telemetry.oom import GUARD, set_oom_score
 from motionserver.telemetry.parent import follow_parent
@@ -26,6 +27,8 @@ LOCK = "guard.lock"
 """Whoever holds it moves the platform."""
 NEXT = "spare.lock"
 """Whoever holds it is next; the reserve waits for it."""
+PRIORITY: Final = 50
+"""SCHED_FIFO priority: the guard comes before the planner."""
 
 
 def main() -> int:
@@ -39,12 +42,12 @@ def main() -> int:
     ignore_signals(but=(signal.SIGTERM,))
     let_through()
     follow_parent()
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir, descriptor = Path(sys.argv[1]), int(sys.argv[2])
     options = read_options(run_dir)
     link = open_link(descriptor)
     # before it waits: a spare that must first queue for a busy processor takes over late
-    scheduling = take_priority(50, options.realtime)
+    scheduling = take_priority(PRIORITY, options.realtime)
+    start_log(prepare_thread=lambda: take_priority(PRIORITY, options.realtime))
     gc.collect()
     gc.freeze()
     memory = f"{lock_memory(options.realtime)}, {set_oom_score(GUARD)}"

@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 
 from motionserver.errors import MotionServerError
-from motionserver.planner.loop import PlannerLoop
-from motionserver.planner.options import read_options
+from motionserver.planner.loop import PRIORITY, PlannerLoop
+from motionserver.planner.options import PlannerOptions, read_options
+from motionserver.telemetry.log_output import start_log
 from motionserver.telemetry.parent import follow_parent
+from motionserver.telemetry.realtime import take_priority
 from motionserver.telemetry.signals import ignore_signals
 
 
@@ -20,17 +22,18 @@ def main() -> int:
     # SIGTERM waits until the loop handles it
     ignore_signals(but=(signal.SIGTERM,))
     follow_parent()
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
     run_dir = Path(sys.argv[1])
     try:
-        return asyncio.run(_run(run_dir))
+        options = read_options(run_dir)
+        start_log(prepare_thread=lambda: take_priority(PRIORITY, options.realtime))
+        return asyncio.run(_run(options, run_dir))
     except (MotionServerError, OSError) as error:
         logging.getLogger("motionserver.planner").error("cannot start: %s", error)
         return 2
 
 
-async def _run(run_dir: Path) -> int:
-    return await PlannerLoop(read_options(run_dir), run_dir).run()
+async def _run(options: PlannerOptions, run_dir: Path) -> int:
+    return await PlannerLoop(options, run_dir).run()
 
 
 if __name__ == "__main__":

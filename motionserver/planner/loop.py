@@ -48,6 +48,8 @@ SECOND: Final = 1_000_000_000
 BEGUN: Final = frozenset({State.RUN, State.HOLD})
 """States of a drive that has begun."""
 SNAPSHOT_NS: Final = 30_000_000
+PRIORITY: Final = 30
+"""SCHED_FIFO priority: below the guard's."""
 UP: Final = frozen([0.0, 0.0, GRAVITY])
 
 log = logging.getLogger("motionserver.planner")
@@ -104,7 +106,7 @@ class PlannerLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
-        scheduling = take_priority(30, self.options.realtime)
+        scheduling = take_priority(PRIORITY, self.options.realtime)
         memory = lock_memory(self.options.realtime)
         self.scheduling = f"{scheduling}, {memory}, {set_oom_score(PLANNER)}"
         self._ticker = Ticker(self._wake)

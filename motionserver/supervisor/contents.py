@@ -14,8 +14,9 @@ from motionserver.telemetry.link import SESSIONS_BYTES, Maps
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.run_files import RunFiles
 
+GUARD_LOCK: Final = "guard.lock"
 SPARE_LOCK: Final = "spare.lock"
-LOCKS: Final = ("guard.lock", SPARE_LOCK)
+LOCKS: Final = (GUARD_LOCK, SPARE_LOCK)
 """Held by the guard that moves the platform, and by the one that is next."""
 LOCK_BYTES: Final = 8
 """Room for what its holder says of itself: exit status, process id."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from motionserver.supervisor.child import Child
-from motionserver.supervisor.contents import LOCK_BYTES, SPARE_LOCK
+from motionserver.supervisor.contents import GUARD_LOCK, LOCK_BYTES, SPARE_LOCK
 from motionserver.telemetry.link import Maps
 from motionserver.telemetry.run_files import RunFiles
 
@@ -36,6 +36,7 @@ class GuardGroup:
         self.children = tuple(children)
         self._maps = maps
         self._spare_lock = files.descriptors[SPARE_LOCK]
+        self._guard_lock = files.descriptors[GUARD_LOCK]
 
     @property
     def active(self) -> Child:
@@ -54,6 +55,11 @@ class GuardGroup:
             return 0 if guard.pid == active else 1 if str(guard.pid).encode() == spare else 2
 
         return sorted(self.children, key=rank)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the last active guard has noted its exit status: nothing moves any more."""
+        return bool(os.pread(self._guard_lock, LOCK_BYTES, 0).strip())
 
     async def park(self) -> int:
         """Let the active guard park; the others are told too, and park if their turn comes.

@@ -185,7 +185,9 @@ class Service:
             if written == pulse.written_ns:
                 active = self.active_guard
                 runnable = active.pid is not None and is_runnable(active.pid)
-            if pulse.look(loop.time(), active.pid, written, runnable):
+            is_frozen = pulse.look(loop.time(), active.pid, written, runnable)
+            # one that has noted its exit status may still wait for its last log lines
+            if is_frozen and not self.guards.has_ended:
                 log.error("%s stands still; killed, the spare takes over", active.name)
                 active.signal(signal.SIGKILL)
             await asyncio.sleep(POLL)

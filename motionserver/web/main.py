@@ -11,6 +11,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
+from motionserver.telemetry.log_output import start_log
 from motionserver.telemetry.oom import HELPER, set_oom_score
 from motionserver.telemetry.parent import follow_parent
 from motionserver.telemetry.run_files import located
@@ -52,7 +53,8 @@ def server(app: FastAPI, config: WebConfig) -> uvicorn.Server:
             proxy_headers=False,
             server_header=False,
             access_log=False,
-            log_level="error",  # a stranger must not be able to fill the log,
+            log_config=None,  # our own output, which nobody waits for
+            log_level="error",  # a stranger must not be able to fill the log
         )
     )
 
@@ -78,6 +80,7 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"page not started: {error}\n")
         return 2
     follow_parent()
+    start_log()
     os.nice(_NICENESS)
     set_oom_score(HELPER)
     server(app, config).run()

@@ -55,7 +55,7 @@ def test_few_plans_are_refused_while_the_page_is_open(chromium, algorithm):
             page = next(
                 found[1]
                 for line in demo.stdout
-                if (found := re.search(r"page\s+(http://\S+)", line)) is not None
+                if (found := re.search(r"page\s+(http://[^\s/]+)", line)) is not None
             )
             context = chromium.new_context(viewport={"width": 1400, "height": 900})
             tab = context.new_page()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import os
 import signal
 import sys
@@ -16,6 +15,7 @@ from motionserver.telemetry.blackbox.dump import Trigger
 from motionserver.telemetry.blackbox.room import FOLDER, free_memory
 from motionserver.telemetry.blackbox.watch import Watch
 from motionserver.telemetry.link import GuardClock
+from motionserver.telemetry.log_output import start_log
 from motionserver.telemetry.mapped import MappedFile
 from motionserver.telemetry.oom import HELPER, set_oom_score
 from motionserver.telemetry.parent import follow_parent
@@ -46,7 +46,7 @@ def main() -> int:
     with contextlib.suppress(OSError):
         os.nice(_POLITE)
     set_oom_score(HELPER)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(name)s %(message)s")
+    start_log()
     run_dir, folder, kept = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     watch = Watch(run_dir, folder, kept, lambda: datetime.now(UTC))
     room = (run_dir / FOLDER).resolve()
