@@ -10,7 +10,7 @@ from motionserver.core.kinematics.hexapod import leg_lengths, leg_speeds
 from motionserver.core.motion.player import Playback, advance, follow, state_now
 from motionserver.core.plan import Plan
 from motionserver.core.safety.accept import accept_proposal
-from motionserver.core.safety.edges import edges
+from motionserver.core.safety.edges import edges, judge_reset
 from motionserver.core.safety.fault_return import FaultReturn
 from motionserver.core.safety.given import GuardConfig, TickInput
 from motionserver.core.safety.own_moves import NEUTRAL, OwnMoves, ends_at_neutral
@@ -81,6 +81,7 @@ class Guard:
         followed = supervisor.step(record, given.now_ns, given.gap, wishes)
         if followed is not None:
             self._enter(*followed, given.now_ns)
+        judge_reset(self.config.patience, record, supervisor, given.now_ns)
         if not given.is_due:
             return None, answers
         return self._send(given.now_ns), answers
@@ -88,8 +89,8 @@ class Guard:
     @property
     def reason(self) -> str:
         """Why it is in its state; in a fault also what is done or waited for, for people."""
-        status = self.supervisor.return_decision.status
-        return f"{self.record.reason}; {status}" if status else self.record.reason
+        record, status = self.record, self.supervisor.return_decision.status
+        return "; ".join(filter(None, (record.reason, record.reset_failure, status)))
 
     @property
     def is_checking(self) -> bool:
@@ -157,11 +158,11 @@ class Guard:
     def _enter(self, state: State, event: Event, now_ns: int) -> None:
         record = self.record
         before = record.state
-        reason = self.supervisor.why(event, now_ns)
+        reason = self.supervisor.why(record, event, now_ns)
         record.note(now_ns, f"{before} -> {state}: {reason}")
         record.counters[f"entered_{state.lower()}"] += 1
         record.state, record.reason, record.since_ns = state, reason, now_ns
-        record.reset_until_ns = 0
+        record.reset_until_ns, record.reset_failure = 0, ""
         self.supervisor.return_decision.enter()
         if state is State.RAISING:
             self._own(self.moves.start_at(NEUTRAL, self.homes), now_ns)

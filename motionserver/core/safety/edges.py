@@ -7,7 +7,7 @@ from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.return_decision import ReturnDecision
 from motionserver.core.safety.states import Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
-from motionserver.core.safety.watchdog import SECOND
+from motionserver.core.safety.watchdog import SECOND, Patience
 
 
 def edges(
@@ -51,6 +51,17 @@ def edges(
     return tuple(answers), frozenset(wishes)
 
 
+def judge_reset(
+    patience: Patience, record: GuardRecord, supervisor: Supervisor, now_ns: int
+) -> None:
+    """Tell once that a granted reset had no effect in its time, and why."""
+    if 0 < record.reset_until_ns <= now_ns:
+        why = supervisor.why_not_reset(now_ns)
+        record.reset_until_ns = 0
+        record.reset_failure = f"a reset had no effect for {patience.reset:g} s: {why}"
+        record.note(now_ns, record.reset_failure)
+
+
 def _park(record: GuardRecord, decision: ReturnDecision) -> str:
     """Why nothing follows from asking to park; empty where it is parked, or parks."""
     if record.state is State.OFFLINE:
@@ -79,6 +90,7 @@ def _reset(config: GuardConfig, record: GuardRecord, supervisor: Supervisor, now
     if not is_standing(record.playback):
         return "the platform still moves; reset when it stands"
     record.reset_until_ns = now_ns + int(config.patience.reset * SECOND)
+    record.reset_failure = ""
     supervisor.inconsistent = ""
     supervisor.astray = False
     return ""

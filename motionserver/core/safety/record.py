@@ -32,6 +32,7 @@ class GuardRecord:
         sent_legs: Where the device was sent last, (6,) [m]; None once it has moved by itself.
         judged_id: Number of the newest proposal that was decided about; 0 = none.
         refusal: Why that one was refused; None if it was accepted.
+        reset_failure: Why the newest reset had no effect, for people; empty if it had, or is tried.
     """
 
     state: State = State.OFFLINE
@@ -50,6 +51,7 @@ class GuardRecord:
     sent_legs: Array | None = None
     judged_id: int = 0
     refusal: Reason | None = None
+    reset_failure: str = ""
 
     def note(self, now_ns: int, text: str) -> None:
         """Keep an event for the page and the log."""

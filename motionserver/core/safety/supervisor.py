@@ -69,7 +69,7 @@ class Supervisor:
             The next state and the event that led there; None to stay.
         """
         if gap > self._gap:
-            self.device.excuse(now_ns)
+            self.device.excuse(now_ns, gap)
             # the plan's clock stood still as well
             record.deadline_ns += int(gap * SECOND)
             if self._excused[0] != record.accepted_ns:
@@ -171,7 +171,7 @@ class Supervisor:
             self.device.excuse(now_ns)
         self.excuse_plans(accepted_ns, now_ns)
 
-    def why(self, event: Event, now_ns: int) -> str:
+    def why(self, record: GuardRecord, event: Event, now_ns: int) -> str:
         """What happened, with its figures, for people."""
         newest = self.device.newest
         if event is Event.INCONSISTENT:
@@ -179,7 +179,7 @@ class Supervisor:
         if event is Event.PARK and self.leave_reason:
             return f"the service is ending: {self.leave_reason}"
         if event is Event.DEVICE_FAULT and newest is not None:
-            return f"the device reports {', '.join(newest.faults) or newest.state}"
+            return self.why_faulty(newest)
         if event is Event.FEEDBACK_LOST:
             return f"no feedback from the device for {self.device.age(now_ns) * 1e3:.0f} ms"
         if event is Event.TRACKING_ERROR:
@@ -189,8 +189,26 @@ class Supervisor:
                 return f"the source is stale: {source_reason(self.source.status, now_ns)}"
             if self.source.is_paused:
                 return "the simulator pauses"
-            return "no plan was accepted from the planner"
+            return no_plan_reason(record)
         return str(event.value)
+
+    def why_not_reset(self, now_ns: int) -> str:
+        """What keeps a reset from having an effect, for people."""
+        newest = self.device.current(now_ns)
+        if newest is None:
+            return "the device does not answer"
+        if newest.estop:
+            return "the emergency stop is open"
+        if reports_fault(newest):
+            return self.why_faulty(newest)
+        if newest.phase in (Phase.UP, Phase.DOWN):
+            return "the device's answers came with breaks, or the platform moved"
+        return f"the device says {newest.state}, neither up nor down"
+
+    @staticmethod
+    def why_faulty(newest: Feedback) -> str:
+        """A device's fault in its own words."""
+        return f"the device reports {', '.join(newest.faults) or newest.state}"
 
     def refusal(self, record: GuardRecord, now_ns: int) -> str:
         """Why engaging is not possible now; empty if it is."""
@@ -204,6 +222,13 @@ class Supervisor:
         if not self.source.is_fresh(now_ns):
             return f"no fresh source: {source_reason(self.source.status, now_ns)}"
         return ""
+
+
+def no_plan_reason(record: GuardRecord) -> str:
+    """Whether the planner sent none, or what was wrong with the newest."""
+    if record.rejections and record.rejections[-1][0] > record.accepted_ns:
+        return f"no plan was accepted from the planner; the newest: {record.rejections[-1][1]}"
+    return "no plan came from the planner"
 
 
 def is_standing(playback: Playback | None) -> bool:

@@ -195,10 +195,18 @@ class DeviceWatch:
         """The newest answer; None before the first and while the device is silent for too long."""
         return None if self.is_lost(now_ns) else self.newest
 
-    def excuse(self, now_ns: int) -> None:
-        """The guard itself stood still, and a base answers what it is sent: wait anew, once."""
+    def excuse(self, now_ns: int, gap: float = 0.0) -> None:
+        """The guard itself stood still, and a base answers what it is sent: wait anew, once.
+
+        Args:
+            now_ns: Now [ns].
+            gap: How long it stood [s]: nothing was sent that the platform could have followed, so
+                that the time of a tracking error stood as well.
+        """
         if self._excused is not self.newest:
             self._excused, self._excused_ns = self.newest, now_ns
+        if self._astray_since is not None:
+            self._astray_since += int(gap * SECOND)
 
     def valid_for(self, now_ns: int) -> float:
         """How long answers have come without a break [s]."""

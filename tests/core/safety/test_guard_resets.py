@@ -29,12 +29,18 @@ def test_reset_is_refused_where_it_makes_no_sense():
     assert b.tick("reset") == ("",)
     b.run(1.0)
     assert b.sent[-1].order is Order.RESET
+    assert "no effect" not in b.guard.reason
     b.run(1.5)
+    why = "a reset had no effect for 2 s: the device reports torque monitor"
+    assert f"; {why}" in b.guard.reason
+    assert [text for _, text in b.record.events].count(why) == 1
     assert b.state == "FAULT"
     assert b.sent[-1].order is Order.PARK
     b.device.held_faults = ()
     b.tick("reset")
+    assert "no effect" not in b.guard.reason
     b.until("PARKED", 30.0)
+    assert "no effect" not in b.guard.reason
 
 
 def test_reset_of_a_silent_device_goes_offline():

@@ -2,6 +2,7 @@
 
 from machines import compact
 
+from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.states import Event
 from motionserver.core.safety.supervisor import Supervisor
 from motionserver.core.safety.watchdog import Patience
@@ -9,8 +10,8 @@ from motionserver.core.safety.watchdog import Patience
 
 def test_a_lost_run_directory_is_the_reason_of_parking() -> None:
     supervisor = Supervisor(compact(), Patience(), 1 / 60, 1 / 60)
-    assert supervisor.why(Event.PARK, 0) == "park was asked for"
+    assert supervisor.why(GuardRecord(), Event.PARK, 0) == "park was asked for"
     supervisor.leave_reason = "the run directory /x was removed"
-    told = supervisor.why(Event.PARK, 0)
+    told = supervisor.why(GuardRecord(), Event.PARK, 0)
     assert told == "the service is ending: the run directory /x was removed"
-    assert supervisor.why(Event.TRACKING_ERROR, 0) != told
+    assert supervisor.why(GuardRecord(), Event.TRACKING_ERROR, 0) != told

@@ -1,5 +1,7 @@
 """Source and planner, holds and pauses exactly at their instants, and what people are told."""
 
+from functools import partial
+
 import pytest
 from machines import compact
 from supervisor_scene import MOVING, MS, NEUTRAL, PERIOD, RESTING, Scene
@@ -9,6 +11,7 @@ from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.source_reason import source_reason
 from motionserver.core.safety.states import Event, State
 from motionserver.core.safety.supervisor import Supervisor, is_standing
+from motionserver.core.safety.verdict import Reason, Rejection
 from motionserver.core.safety.watchdog import CueStatus, Patience
 from motionserver.core.state import DriveMode
 
@@ -184,23 +187,25 @@ def test_what_happened_is_told_with_its_figures():
     scene = Scene()
     supervisor, now = scene.supervisor, scene.now
     supervisor.inconsistent = "no way home"
-    assert supervisor.why(Event.INCONSISTENT, now) == "no way home"
-    assert supervisor.why(Event.DEVICE_FAULT, now) == "the device reports UP"
+    assert supervisor.why(scene.record, Event.INCONSISTENT, now) == "no way home"
+    assert supervisor.why(scene.record, Event.DEVICE_FAULT, now) == "the device reports UP"
     scene.answer["faults"] = ("bus", "drive 3")
     scene.tick()
-    assert supervisor.why(Event.DEVICE_FAULT, now) == "the device reports bus, drive 3"
-    lost = supervisor.why(Event.FEEDBACK_LOST, scene.now + 1234 * MS)
+    assert (
+        supervisor.why(scene.record, Event.DEVICE_FAULT, now) == "the device reports bus, drive 3"
+    )
+    lost = supervisor.why(scene.record, Event.FEEDBACK_LOST, scene.now + 1234 * MS)
     assert lost == "no feedback from the device for 1234 ms"
     supervisor.device.error = 0.1234
-    astray = supervisor.why(Event.TRACKING_ERROR, now)
+    astray = supervisor.why(scene.record, Event.TRACKING_ERROR, now)
     assert astray == "the platform does not follow: 123.4 mm off"
-    assert supervisor.why(Event.PARK, now) == "park was asked for"
+    assert supervisor.why(scene.record, Event.PARK, now) == "park was asked for"
 
 
 def test_why_it_holds_is_told():
     scene = Scene()
-    why, now = scene.supervisor.why, scene.now
-    assert why(Event.TROUBLE, now) == "no plan was accepted from the planner"
+    why, now = partial(scene.supervisor.why, scene.record), scene.now
+    assert why(Event.TROUBLE, now) == "no plan came from the planner"
     assert why(Event.TROUBLE, now + 151 * MS) == (
         "the source is stale: the planner has not reported for 151 ms; the simulator was heard by "
         "it until then"
@@ -210,9 +215,47 @@ def test_why_it_holds_is_told():
     assert why(Event.TROUBLE, scene.now) == "the simulator pauses"
 
 
+def test_the_newest_rejection_since_the_last_accepted_plan_is_told():
+    scene = Scene()
+    why, now, record = scene.supervisor.why, scene.now, scene.record
+    record.rejections.append((record.accepted_ns, Rejection(Reason.TOO_LATE)))
+    assert why(record, Event.TROUBLE, now) == "no plan came from the planner"
+    record.rejections.append(
+        (record.accepted_ns + 1, Rejection(Reason.LEG_SPEED, 0.5, 2, 0.7, 0.6))
+    )
+    assert why(record, Event.TROUBLE, now) == (
+        "no plan was accepted from the planner; the newest: plan rejected: leg-speed, leg 3, at "
+        "0.500 s, found 0.7, allowed 0.6"
+    )
+
+
+@pytest.mark.parametrize(
+    ("phase", "answer", "told"),
+    [
+        (Phase.UP, {"estop": True, "faults": ("bus",)}, "the emergency stop is open"),
+        (Phase.UP, {"faults": ("bus", "drive 3")}, "the device reports bus, drive 3"),
+        (Phase.FAULTED, {}, "the device reports FAULTED"),
+        (Phase.UP, {}, "the device's answers came with breaks, or the platform moved"),
+        (Phase.DOWN, {}, "the device's answers came with breaks, or the platform moved"),
+        (Phase.LOWERING, {}, "the device says LOWERING, neither up nor down"),
+    ],
+)
+def test_what_keeps_a_reset_from_its_effect_is_told(phase, answer, told):
+    scene = Scene()
+    scene.phase = phase
+    scene.answer.update(answer)
+    scene.tick()
+    assert scene.supervisor.why_not_reset(scene.now) == told
+
+
+def test_a_reset_of_a_device_that_went_silent_is_told():
+    scene = Scene()
+    assert scene.supervisor.why_not_reset(scene.now + 101 * MS) == "the device does not answer"
+
+
 def test_a_device_that_never_answered_has_reported_no_fault():
     supervisor = Supervisor(compact(), Patience(), PERIOD, PERIOD)
-    assert supervisor.why(Event.DEVICE_FAULT, 0) == "the device reports a fault"
+    assert supervisor.why(GuardRecord(), Event.DEVICE_FAULT, 0) == "the device reports a fault"
 
 
 def test_why_engaging_is_not_possible_is_told():

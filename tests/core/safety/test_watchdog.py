@@ -66,6 +66,19 @@ def test_an_excuse_holds_once_and_for_one_answer():
     assert device.valid_for(600 * MS) == pytest.approx(0.6)
 
 
+def test_a_stall_of_the_guard_is_no_time_of_a_tracking_error():
+    device = watch()
+    legs = lengths(compact(), ZERO)[0]
+    device.excuse(0, 0.3)
+    device.answered(answer(0, legs=legs))
+    assert not device.track(0, legs + 0.02, ZERO)
+    assert not device.track(90 * MS, legs + 0.02, ZERO)
+    # nothing was sent for 60 ms: 90 ms of error are known when it goes on
+    device.excuse(150 * MS, 0.06)
+    assert not device.track(160 * MS, legs + 0.02, ZERO)
+    assert device.track(161 * MS, legs + 0.02, ZERO)
+
+
 def test_tracking_is_by_leg_with_room_for_speed_and_time():
     device = watch()
     legs = lengths(compact(), ZERO)[0]
