@@ -24,7 +24,8 @@ import pytest
 from mutation.children import each, limit_processor
 from mutation.mutants import Mutant
 
-OPTIONS = ["-q", "-s", "--timeout=0", "-p", "no:cacheprovider", "-W",
+# in this very process: workers of their own would run tests without the exchanged code
+OPTIONS = ["-q", "-s", "-n", "0", "--timeout=0", "-p", "no:cacheprovider", "-W",
            "ignore::pytest.PytestAssertRewriteWarning"]  # fmt: skip
 PATIENCE = 1800.0
 NEVER = "no test passes here"

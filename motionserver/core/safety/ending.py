@@ -36,7 +36,7 @@ def exit_status(record: GuardRecord, device: DeviceWatch, began_ns: int, now_ns:
             return PARKED
     elif record.state not in LATCHED or not is_standing(record.playback):
         return None
-    elif device.current(now_ns) is not None and newest is not None and is_down(newest):
+    elif (current := device.current(now_ns)) is not None and is_down(current):
         return PARKED
     elif record.state is State.SAFE and newest is not None and newest.estop:
         # an open stop is followed: nothing that is sent would bring it down

@@ -70,6 +70,13 @@ def test_an_old_answer_is_no_proof_that_it_is_down():
     assert status(State.FAULT, DOWN, now=NOW + 3 * SECOND, deadline=NOW + 2 * SECOND) == 3
 
 
+def test_an_old_answer_of_an_open_stop_does_not_end_the_tries_of_a_fault():
+    """The device fell silent with it: it is tried for as long as parking may take."""
+    since = NOW + SECOND
+    assert status(State.FAULT, STOPPED, now=since, deadline=since) is None
+    assert status(State.FAULT, STOPPED, now=since, deadline=since - 1) == 3
+
+
 @pytest.mark.parametrize(
     ("newest", "due", "expected"),
     [(None, False, 0), (DOWN, False, 0), (UP, False, None), (UP, True, 3), (HOME, False, 0)],
