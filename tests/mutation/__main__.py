@@ -19,16 +19,36 @@ from mutation.mutants import Mutant, mutants_of, unchanged
 ROOT = Path(__file__).parents[2]
 ALIVE = ("survived", farm.NEVER)
 NAMED = Path(__file__).with_name("equivalent.toml")
+INTAKE = "motionserver/core/intake"
 SAFETY = "motionserver/core/safety"
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
-    "motionserver/core/intake": ["tests/intake"],
+    f"{INTAKE}/agreement.py": ["tests/intake/test_agreement.py"],
+    f"{INTAKE}/plausibility.py": [
+        "tests/intake/test_gravity_at_standstill.py",
+        "tests/intake/test_plausibility.py",
+    ],
+    f"{INTAKE}/sender_clock.py": [
+        "tests/intake/test_gate.py",
+        "tests/intake/test_gate_limits.py",
+        "tests/intake/test_sender_clock.py",
+    ],
+    f"{INTAKE}/sequence_order.py": [
+        "tests/intake/test_gate.py",
+        "tests/intake/test_sequence_order.py",
+    ],
+    f"{INTAKE}/stamp_rate.py": ["tests/intake/test_stamp_rate.py"],
+    f"{INTAKE}/standstill.py": ["tests/intake/test_standstill.py"],
+    INTAKE: ["tests/intake"],
     "motionserver/core/plan.py": [
         "tests/core/test_plan.py",
         "tests/core/safety/test_shape.py",
         "tests/core/safety/test_verify.py",
     ],
     "motionserver/core/motion": ["tests/core/motion"],
+    "motionserver/guard/send_grid.py": ["tests/guard/test_send_grid.py"],
+    "motionserver/planner/handover.py": ["tests/planner/test_handover.py"],
+    "motionserver/planner/open_proposals.py": ["tests/planner/test_handover.py"],
     f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
     f"{SAFETY}/slices.py": ["tests/core/safety/test_slices.py"],
     f"{SAFETY}/accept.py": [

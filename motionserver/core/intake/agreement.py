@@ -70,54 +70,64 @@ class Agreement:
     def __init__(self) -> None:
         """Begin without a packet."""
         self.complaint = ""
-        self._last: VehicleMotion | None = None
-        self._begin_ns = 0
-        self._sums = np.zeros((len(_PAIRS), 2))
-        self._usable = np.ones(len(_PAIRS), bool)
+        self._sums: _Sums | None = None
         self._found: list[deque[tuple[float, float]]] = [deque(maxlen=KEPT) for _ in _PAIRS]
         self._preview = PreviewAgreement()
 
     def heard(self, motion: VehicleMotion) -> None:
         """Note a packet."""
         self._preview.heard(motion)
-        last, self._last = self._last, motion
-        if last is None or not _goes_on(last, motion):
-            self._restart(motion.arrival_ns)
+        sums = self._sums
+        if sums is None or not _goes_on(sums.last, motion):
+            self._sums = _Sums(motion)
             return
-        self._add(last, motion)
-        if motion.arrival_ns - self._begin_ns >= STEP_NS:
-            for pair, sums in enumerate(self._sums):
-                if self._usable[pair]:
-                    self._found[pair].append((float(sums[0]), float(sums[1])))
-            self._restart(motion.arrival_ns)
+        sums.add(motion)
+        if motion.arrival_ns - sums.begin_ns >= STEP_NS:
+            for found, both, usable in zip(self._found, sums.both, sums.usable, strict=True):
+                if usable:
+                    found.append((float(both[0]), float(both[1])))
+            self._sums = _Sums(motion)
             said = (_judged(*one) for one in zip(_PAIRS, self._found, strict=True))
             self.complaint = next(filter(None, said), "") or self._preview.complaint
 
-    def _restart(self, now_ns: int) -> None:
-        self._begin_ns = now_ns
-        self._sums[:] = 0.0
-        self._usable[:] = True
 
-    def _add(self, last: VehicleMotion, motion: VehicleMotion) -> None:
+class _Sums:
+    """What both of each pair gained since a packet.
+
+    Attributes:
+        last: The newest packet.
+        begin_ns: Arrival of the first one [ns].
+        both: The sums, one row per pair.
+        usable: Which pairs could be compared all the time.
+    """
+
+    def __init__(self, first: VehicleMotion) -> None:
+        self.last, self.begin_ns = first, first.arrival_ns
+        self.both = np.zeros((len(_PAIRS), 2))
+        self.usable = np.ones(len(_PAIRS), bool)
+
+    def add(self, motion: VehicleMotion) -> None:
+        """Add what was gained between the newest packet and this one."""
+        last, self.last = self.last, motion
         elapsed = (motion.arrival_ns - last.arrival_ns) * 1e-9
         p, q, r = (0.5 * (last.rates + motion.rates)).tolist()
         gravity = None
         if last.attitude is None or motion.attitude is None or cos(motion.attitude[1]) < _STEEP:
-            self._usable[:2] = False
+            self.usable[:2] = False
         else:
             roll, pitch = motion.attitude
             turned = q * sin(roll) + r * cos(roll)
             moved = (roll - last.attitude[0], pitch - last.attitude[1])
             rates = (p + tan(pitch) * turned, q * cos(roll) - r * sin(roll))
-            self._sums[:2] += np.array((moved, np.multiply(rates, elapsed))).T
+            self.both[:2] += np.array((moved, np.multiply(rates, elapsed))).T
             gravity = gravity_in_body(np.array(roll), np.array(pitch))
         if gravity is None or not motion.speed_known or motion.speed < FASTER:
             # what the force says of the acceleration hangs on the slope
-            self._usable[2:] = False
+            self.usable[2:] = False
             return
         forward, left, _ = ((motion.force - gravity) * elapsed).tolist()
-        self._sums[2] += (motion.speed - last.speed, forward)
-        self._sums[3] += (motion.speed * r * elapsed, left)
+        self.both[2] += (motion.speed - last.speed, forward)
+        self.both[3] += (motion.speed * r * elapsed, left)
 
 
 def _goes_on(last: VehicleMotion, motion: VehicleMotion) -> bool:
@@ -166,16 +176,17 @@ class PreviewAgreement:
         """Begin without a packet."""
         self.complaint = ""
         self._apart: deque[float] = deque(maxlen=KEPT)
-        self._noted_ns = 0
+        self._noted_ns: int | None = None
 
     def heard(self, motion: VehicleMotion) -> None:
         """Note a packet; ten a second are enough."""
         preview = motion.preview
         if preview is None or preview.times[0] > PREVIEW_NEAR:
             return
-        if self._apart and motion.arrival_ns - self._noted_ns < 100 * MS:
+        now = motion.arrival_ns
+        if self._noted_ns is not None and now - self._noted_ns < 100 * MS:
             return
-        self._noted_ns = motion.arrival_ns
+        self._noted_ns = now
         self._apart.append(float(np.linalg.norm(preview.force[0] - motion.force)))
         middle = float(np.median(self._apart))
         bad = len(self._apart) >= FEWEST and middle > PREVIEW_APART

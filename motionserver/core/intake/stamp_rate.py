@@ -44,59 +44,50 @@ class StampRate:
     def __init__(self) -> None:
         """Begin without a packet."""
         self.complaint = ""
-        self._window: _Window | None = None
-        self._former: _Window | None = None
-        self._newest = 0
+        # the former window, if there is one, and the present one
+        self._windows: tuple[_Window | None, _Window] | None = None
 
     def heard(self, arrival: int, stamp: int) -> None:
         """Note a packet that came in order of its sequence [ns]."""
-        window = self._window
+        former, window = self._windows or (None, None)
         if window is None or arrival - window.arrival > 2 * WINDOW_NS + window.arrived:
             # the first one, or the first after a silence that belongs to no window
-            self._window, self._former, self._newest = _Window(arrival, stamp), None, stamp
+            self._windows = None, _Window(arrival, stamp)
             return
         window.packets += 1
-        window.back += stamp < self._newest
+        window.back += stamp < window.stamp + window.advanced
         window.arrived, window.advanced = arrival - window.arrival, stamp - window.stamp
-        self._newest = stamp
         if window.arrived >= WINDOW_NS and window.packets >= FEWEST:
-            self._judge(window)
-            self._window, self._former = _Window(arrival, stamp), window
+            if former is not None:
+                self._judge(former, window)
+            self._windows = window, _Window(arrival, stamp)
 
-    def _judge(self, window: _Window) -> None:
-        former = self._former
-        if former is None:
-            return
-        if _is_good(window) and _is_good(former):
+    def _judge(self, former: _Window, window: _Window) -> None:
+        good = _is_good(former), _is_good(window)
+        if all(good):
             self.complaint = ""
-        elif not _is_good(window) and not _is_good(former):
+        elif not any(good):
             # a pause and the burst after it balance one another, a clock that was set does not last
-            both = _Window(
-                former.arrival,
-                former.stamp,
-                former.packets + window.packets,
-                former.back + window.back,
-                former.arrived + window.arrived,
-                former.advanced + window.advanced,
-            )
+            is_balanced = _is_good(former, window)
             # the newer one is all of one kind, even where the older one saw the clock change
-            self.complaint = "" if _is_good(both) else _words(window, self._newest)
+            self.complaint = "" if is_balanced else _words(window)
 
 
-def _rate(window: _Window) -> float:
-    return window.advanced / window.arrived
+def _rate(*windows: _Window) -> float:
+    return sum(one.advanced for one in windows) / sum(one.arrived for one in windows)
 
 
-def _is_good(window: _Window) -> bool:
-    return abs(_rate(window) - 1.0) <= TOLERANCE and window.back < MOST_BACK
+def _is_good(*windows: _Window) -> bool:
+    is_steady = abs(_rate(*windows) - 1.0) <= TOLERANCE
+    return is_steady and sum(one.back for one in windows) < MOST_BACK
 
 
-def _words(window: _Window, stamp: int) -> str:
+def _words(window: _Window) -> str:
     if window.back >= MOST_BACK:
         return f"the sender time went backwards {window.back} times in a second. {_REMEDY}"
     if window.advanced == 0:
-        return f"the sender time does not advance, it is {stamp} in every packet. {_REMEDY}"
+        return f"the sender time does not advance, it is {window.stamp} in every packet. {_REMEDY}"
     rate = _rate(window)
     unit = next((name for one, name in _UNITS.items() if 0.5 < rate / one < 2.0), None)
-    guess = "" if unit is None else f": is it in {unit}?"
-    return f"the sender time runs at {rate:.3g} times the rate of time{guess or '.'} {_REMEDY}"
+    guess = "." if unit is None else f": is it in {unit}?"
+    return f"the sender time runs at {rate:.3g} times the rate of time{guess} {_REMEDY}"

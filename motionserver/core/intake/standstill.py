@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -30,6 +30,16 @@ _EVERY_NS: Final = 50 * MS
 _FEWEST: Final = 6
 
 
+@dataclass(slots=True)
+class _Stretch:
+    """What was felt while the vehicle stood, or moved without turning."""
+
+    moves: bool
+    since_ns: int
+    noted_ns: int
+    forces: list[Array] = field(default_factory=list)
+
+
 class StandstillForce:
     """Judges the mean specific force of each second of standing.
 
@@ -40,38 +50,34 @@ class StandstillForce:
     def __init__(self) -> None:
         """Begin without a packet."""
         self.complaint = ""
-        self._since: int | None = None
-        self._forces: deque[Array] = deque(maxlen=2 * MOVES_NS // _EVERY_NS)
-        self._noted_ns = 0
-        self._moves = False
+        self._stretch: _Stretch | None = None
 
     def heard(self, motion: VehicleMotion) -> None:
         """Note a packet."""
         if motion.mode is not DriveMode.DRIVE or np.any(np.abs(motion.rates) > CALM):
-            self._since = None
+            self._stretch = None
             return
         now = motion.arrival_ns
         moves = motion.speed_known and abs(motion.speed) > SLOW
-        if self._since is None or moves is not self._moves:
-            self._since = self._noted_ns = now
-            self._moves = moves
-            self._forces.clear()
-        elif now - self._noted_ns < _EVERY_NS:
+        stretch = self._stretch
+        if stretch is None or moves is not stretch.moves:
+            stretch = self._stretch = _Stretch(moves, now, now)
+        elif now - stretch.noted_ns < _EVERY_NS:
             return
-        self._noted_ns = now
-        self._forces.append(motion.force)
-        if now - self._since < (MOVES_NS if moves else STANDS_NS) or len(self._forces) < _FEWEST:
+        stretch.noted_ns = now
+        stretch.forces.append(motion.force)
+        least_ns = MOVES_NS if moves else STANDS_NS
+        if now - stretch.since_ns < least_ns or len(stretch.forces) < _FEWEST:
             return
-        forces = np.array(self._forces)
+        forces = np.array(stretch.forces)
         if np.any(np.ptp(forces, axis=0) > STEADY):
             # it moves, whatever its speed says
-            self._since = None
+            self._stretch = None
             return
         force = forces.mean(axis=0)
         if (motion.speed_known and not moves) or _counts_gravity_wrong(force):
             self.complaint = _judged(force, motion.attitude, moves)
-        self._since = now
-        self._forces.clear()
+        self._stretch = _Stretch(moves, now, now)
 
 
 def _counts_gravity_wrong(force: Array) -> bool:
