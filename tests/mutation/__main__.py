@@ -78,10 +78,7 @@ SUITES = {
         "tests/core/safety/test_guard_restarts.py",
     ],
     f"{SAFETY}/record.py": ["tests/core/safety/test_record.py"],
-    f"{SAFETY}/return_decision.py": [
-        "tests/core/safety/test_fault_return.py",
-        "tests/core/safety/test_guard_resets.py",
-    ],
+    f"{SAFETY}/return_decision.py": ["tests/core/safety/test_return_decision.py"],
     f"{SAFETY}/shape.py": ["tests/core/safety/test_shape.py", "tests/core/safety/test_verify.py"],
     f"{SAFETY}/source_reason.py": ["tests/core/safety/test_supervisor_source.py"],
     f"{SAFETY}/states.py": [

@@ -7,7 +7,7 @@ without fault for a while, standing where it was sent, it is brought home and pa
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import Enum, auto
 from typing import Final
 
 import numpy as np
@@ -23,16 +23,30 @@ NEWS: Final = SECOND // 2
 class Step(Enum):
     """What is done next with a platform that stands in a fault."""
 
-    WAIT = "wait"
+    WAIT = auto()
     """Send the mode word."""
-    PARK = "park"
+    PARK = auto()
     """Let the device settle by itself."""
-    HOME = "home"
+    HOME = auto()
     """Move straight to neutral, from the rest that was played."""
-    BEGIN = "begin"
+    BEGIN = auto()
     """Begin at the measured place, then move to neutral: nothing was played."""
-    DOWN = "down"
+    DOWN = auto()
     """It is down."""
+
+
+class _Kind(Enum):
+    """What is noted once, however its words change."""
+
+    WAITS = auto()
+    FAULT = auto()
+    SILENT = auto()
+    STARTING = auto()
+    ELSEWHERE = auto()
+    REFUSED = auto()
+    HOME = auto()
+    PARKS = auto()
+    DOWN = auto()
 
 
 class ReturnDecision:
@@ -46,29 +60,28 @@ class ReturnDecision:
     def __init__(self, patience: Patience, device: DeviceWatch) -> None:
         self._patience = patience
         self._device = device
+        self._seen_ns = self._noted_ns = 0
+        self._phase: Phase | None = None
+        self._kind: _Kind | None = None
+        self.enter()
+
+    def enter(self) -> None:
+        """Begin anew: a state was entered."""
         self._since: int | None = None
         self._settles = False
-        self._seen_ns = 0
-        self._phase: Phase | None = None
-        # what forbade the last try; which status was noted last, and when [ns]
+        # what forbade the last try, and what was noted last
         self._refused = ""
-        self._kind = self._noted = ""
-        self._noted_ns = 0
+        self._noted: _Kind | None = None
         self.status = ""
         """What is done or waited for, for people; empty outside a fault."""
         self.is_blocked = False
         """True while nothing would follow: the device is silent, or stands elsewhere."""
 
-    def enter(self) -> None:
-        """Begin anew: a state was entered."""
-        self._since, self._settles, self._refused = None, False, ""
-        self.status, self.is_blocked, self._noted = "", False, ""
-
     def wait_again(self, why: str) -> None:
         """The way home could not be begun; it is tried again after the same wait."""
         self._since = None
         self._refused = f"it cannot go home by itself: {why}"
-        self._blocked("refused", self._refused)
+        self._blocked(_Kind.REFUSED, self._refused)
 
     def decide(self, legs: Array | None, is_played: bool, is_neutral: bool, now_ns: int) -> Step:
         """Decide what is done next; the plan has ended.
@@ -92,20 +105,23 @@ class ReturnDecision:
         if newest is not None and reports_fault(newest):
             self._since = None
             return self._goes_on(
-                "fault", Step.PARK, f"the device is told to park as long as it {reports(newest)}"
+                _Kind.FAULT,
+                Step.PARK,
+                f"the device is told to park as long as it {reports(newest)}",
             )
         if newest is None or device.is_lost(now_ns):
             self._since = None
             return self._blocked(
-                "silent",
+                _Kind.SILENT,
                 "the device does not answer; once it has answered without fault for "
                 f"{wait:g} s it is brought home and parked",
             )
         if newest.phase is Phase.DOWN:
-            return self._goes_on("down", Step.DOWN, "it is down; a reset makes it ready again")
+            return self._goes_on(_Kind.DOWN, Step.DOWN, "it is down; a reset makes it ready again")
         if newest.phase is Phase.STARTING:
-            self._since = None
-            return self._blocked("starting", f"the device says {newest.state}; it is waited for")
+            return self._blocked(
+                _Kind.STARTING, f"the device says {newest.state}; it is waited for"
+            )
         if newest.phase is not Phase.UP:
             # it lifts or settles by itself: to park is its own affair in either case
             return self._parks() if settles or self._has_waited(True, now_ns) else self._waits()
@@ -115,7 +131,7 @@ class ReturnDecision:
         if off > self._patience.track:
             self._since = None
             return self._blocked(
-                "elsewhere",
+                _Kind.ELSEWHERE,
                 f"the platform stands {1e3 * off:.0f} mm from where it was sent: free it, or reset "
                 "to bring it home from where it is measured",
             )
@@ -128,7 +144,7 @@ class ReturnDecision:
         )
         self._refused = ""
         return self._goes_on(
-            "home", Step.HOME if is_played else Step.BEGIN, f"it is on its way home{assumed}"
+            _Kind.HOME, Step.HOME if is_played else Step.BEGIN, f"it is on its way home{assumed}"
         )
 
     def _has_waited(self, is_still: bool, now_ns: int) -> bool:
@@ -142,13 +158,13 @@ class ReturnDecision:
 
     def _parks(self) -> Step:
         self._settles = True
-        return self._goes_on("parks", Step.PARK, "it is being parked")
+        return self._goes_on(_Kind.PARKS, Step.PARK, "it is being parked")
 
     def _waits(self) -> Step:
         if self._refused:
-            return self._blocked("refused", self._refused)
+            return self._blocked(_Kind.REFUSED, self._refused)
         return self._goes_on(
-            "waits",
+            _Kind.WAITS,
             Step.WAIT,
             "it is brought home and parked once the device has answered without fault for "
             f"{self._patience.sound:g} s",
@@ -160,17 +176,17 @@ class ReturnDecision:
             return 0.0
         return float(np.max(np.abs(measured - legs)))
 
-    def _goes_on(self, kind: str, step: Step, status: str) -> Step:
+    def _goes_on(self, kind: _Kind, step: Step, status: str) -> Step:
         self._kind, self.status, self.is_blocked = kind, status, False
         return step
 
-    def _blocked(self, kind: str, status: str) -> Step:
+    def _blocked(self, kind: _Kind, status: str) -> Step:
         self._kind, self.status, self.is_blocked = kind, status, True
         return Step.WAIT
 
     def news(self, now_ns: int) -> str:
         """What is worth an event, once; empty if nothing is."""
-        if self._kind in ("waits", self._noted) or now_ns - self._noted_ns < NEWS:
+        if self._kind in (_Kind.WAITS, self._noted) or now_ns - self._noted_ns < NEWS:
             return ""
         self._noted, self._noted_ns = self._kind, now_ns
         return self.status
