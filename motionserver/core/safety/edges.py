@@ -29,7 +29,6 @@ def edges(
     answers: list[str] = []
     for request in given.requests:
         record.counters[f"request_{request.op}"] += 1
-        refusal = ""
         if request.op == "park":
             refusal = _park(record, supervisor.return_decision)
             if not refusal:

@@ -16,7 +16,7 @@ from motionserver.core.axes import Array
 from motionserver.core.device import Feedback, Phase
 from motionserver.core.safety.watchdog import SECOND, DeviceWatch, Patience, reports_fault
 
-NEWS: Final = SECOND // 2
+NEWS: Final = 500_000_000
 """Shortest time between two events about a fault's way home [ns]: devices may flicker."""
 
 
@@ -109,20 +109,21 @@ class ReturnDecision:
                 Step.PARK,
                 f"the device is told to park as long as it {reports(newest)}",
             )
-        if newest is None or device.is_lost(now_ns):
+        current = device.current(now_ns)
+        if current is None:
             self._since = None
             return self._blocked(
                 _Kind.SILENT,
                 "the device does not answer; once it has answered without fault for "
                 f"{wait:g} s it is brought home and parked",
             )
-        if newest.phase is Phase.DOWN:
+        if current.phase is Phase.DOWN:
             return self._goes_on(_Kind.DOWN, Step.DOWN, "it is down; a reset makes it ready again")
-        if newest.phase is Phase.STARTING:
+        if current.phase is Phase.STARTING:
             return self._blocked(
-                _Kind.STARTING, f"the device says {newest.state}; it is waited for"
+                _Kind.STARTING, f"the device says {current.state}; it is waited for"
             )
-        if newest.phase is not Phase.UP:
+        if current.phase is not Phase.UP:
             # it lifts or settles by itself: to park is its own affair in either case
             return self._parks() if settles or self._has_waited(True, now_ns) else self._waits()
         if settles:

@@ -6,7 +6,7 @@ from typing import Final
 
 from motionserver.core.safety.watchdog import SECOND, CueStatus
 
-_LATE_NS: Final = SECOND // 20
+_LATE_NS: Final = 50_000_000
 """A planner that reported more recently is not late [ns]."""
 
 
@@ -23,7 +23,7 @@ def source_reason(status: CueStatus, now_ns: int) -> str:
         return "the planner has not reported yet: it is starting, or its process has ended"
     late = now_ns - looked
     # the larger share of the age is to blame
-    if late > _LATE_NS and late > (looked - heard if heard else 0):
+    if late > _LATE_NS and (heard == 0 or late > looked - heard):
         until = "the simulator was heard by it until then" if heard else "it had heard no simulator"
         return f"the planner has not reported for {_ago(late)}; {until}"
     if status.trouble:

@@ -89,6 +89,19 @@ def test_parking_is_refused_where_nothing_would_follow(state, said):
     assert scene.record.counters == {"request_park": 1, "request_refused": 1}
 
 
+def test_parking_is_granted_in_a_fault_that_parks_by_itself():
+    scene = Scene(State.FAULT)
+    scene.supervisor.return_decision.decide(None, True, False, NOW)
+    assert scene.supervisor.return_decision.status
+    assert scene.ask("park") == (("",), {Event.PARK})
+
+
+def test_what_a_former_fault_waited_for_forbids_no_parking():
+    scene = Scene(State.RUN)
+    scene.supervisor.return_decision.wait_again("no way")
+    assert scene.ask("park") == (("",), {Event.PARK})
+
+
 def test_every_request_of_a_tick_has_its_answer_in_order():
     answers, wishes = Scene().ask("reset", "engage", "park", "reset")
     assert [bool(answer) for answer in answers] == [True, False, False, True]

@@ -8,11 +8,13 @@ from act_scene import NEUTRAL, ZERO
 from machines import compact
 
 from motionserver.core.device import Feedback, Phase
-from motionserver.core.safety.return_decision import NEWS, ReturnDecision, Step
+from motionserver.core.safety.return_decision import ReturnDecision, Step
 from motionserver.core.safety.watchdog import DeviceWatch, Patience
 
 MS = 1_000_000
 SECOND = 1_000_000_000
+NEWS = 500 * MS
+"""Shortest time between two events about the same fault [ns]."""
 PATIENT = "it is brought home and parked once the device has answered without fault for 1 s"
 SILENT = (
     "the device does not answer; once it has answered without fault for 1 s it is brought home and "
@@ -95,14 +97,21 @@ def test_a_fault_that_is_looked_at_begins_the_second_with_the_next_look(looks) -
     looks.look(faults=("bus",))
     # its end is answered before it is looked at
     looks.device.answered(Feedback(looks.now + 1, Phase.UP, "UP", NEUTRAL))
-    assert looks.waits() is Step.HOME
+    waits_from_the_next_look(looks)
 
 
 def test_silence_that_is_looked_at_begins_the_second_with_the_next_look(looks) -> None:
     looks.looks(10)
     looks.looks(3, None)
     looks.device.answered(Feedback(looks.now + 1, Phase.UP, "UP", NEUTRAL))
-    assert looks.waits() is Step.HOME
+    waits_from_the_next_look(looks)
+
+
+def waits_from_the_next_look(looks: Looks) -> None:
+    assert looks.looks(20) == [Step.WAIT] * 20
+    # 999 ms after the first of these looks, 1049 ms after the answer before it
+    assert looks.look(49 * MS) is Step.WAIT
+    assert looks.look(1 * MS) is Step.HOME
 
 
 @pytest.mark.parametrize(("gap", "begins_anew"), [(300 * MS, False), (300 * MS + 1, True)])
@@ -273,6 +282,10 @@ def test_what_moves_is_waited_for_where_nothing_was_played(looks) -> None:
         assert looks.look(legs=NEUTRAL + 0.003 * (k % 2)) is Step.WAIT
         assert looks.decision.status == PATIENT
     assert looks.looks(40).index(Step.BEGIN) == 26
+    looks.decision.enter()
+    looks.looks(15)
+    looks.look(legs=NEUTRAL + 0.003)
+    assert looks.looks(40, legs=NEUTRAL + 0.003).index(Step.BEGIN) == 25
     looks.is_played = True
     looks.decision.enter()
     assert [looks.look(legs=NEUTRAL + 0.003 * (k % 2)) for k in range(21)][-1] is Step.HOME
@@ -297,6 +310,7 @@ def test_what_forbade_the_way_home_is_forgotten_with_another_state(looks) -> Non
     looks.waits()
     looks.decision.wait_again("no way")
     looks.decision.enter()
+    assert (looks.decision.status, looks.decision.is_blocked) == ("", False)
     looks.look()
     assert (looks.decision.status, looks.decision.is_blocked) == (PATIENT, False)
 

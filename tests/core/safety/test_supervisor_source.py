@@ -313,6 +313,36 @@ def test_a_supervisor_begins_without_a_complaint():
             CueStatus(looked_ns=9_990 * MS),
             "no packet of a simulator has arrived: start the simulator first",
         ),
+        # 50 ms is no delay of the planner, and a nanosecond more is one
+        (
+            CueStatus(looked_ns=9_950 * MS),
+            "no packet of a simulator has arrived: start the simulator first",
+        ),
+        (
+            CueStatus(looked_ns=9_950 * MS - 1),
+            "the planner has not reported for 50 ms; it had heard no simulator",
+        ),
+        # the side is named to which the larger share of the age belongs
+        (
+            CueStatus(heard_ns=9_840 * MS, looked_ns=9_940 * MS),
+            "the simulator's newest packet is 160 ms old",
+        ),
+        (
+            CueStatus(heard_ns=9_880 * MS, looked_ns=9_940 * MS),
+            "the simulator's newest packet is 120 ms old",
+        ),
+        (
+            CueStatus(heard_ns=9_880 * MS + 1, looked_ns=9_940 * MS),
+            "the planner has not reported for 60 ms; the simulator was heard by it until then",
+        ),
+        (
+            CueStatus(heard_ns=9_000 * MS, looked_ns=9_999 * MS),
+            "the simulator's newest packet is 1.0 s old",
+        ),
+        (
+            CueStatus(heard_ns=10_000 * MS - 900_500_400, looked_ns=9_999 * MS),
+            "the simulator's newest packet is 901 ms old",
+        ),
         (CueStatus(0, 0, heard_ns=9_985 * MS, trouble="in g", looked_ns=9_990 * MS), "in g"),
     ],
 )

@@ -307,3 +307,28 @@ def test_answers_are_sound_from_the_first_without_a_fault_until_they_are_missing
     assert watch.sound_for(1201 * MS) == 0.0
     watch.answered(Feedback(1300 * MS, Phase.UP, "UP"))
     assert watch.sound_for(1350 * MS) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    "unsound",
+    [{"faults": ("bus",)}, {"estop": True}, {"phase": Phase.FAULTED}, {"phase": Phase.DISABLED}],
+)
+def test_a_fault_or_an_open_stop_is_unsound_for_as_long_as_it_is_answered(unsound):
+    watch = DeviceWatch(compact(), Patience(), 1 / 60)
+    watch.answered(Feedback(1000 * MS, Phase.UP, "UP"))
+    assert watch.sound_for(1020 * MS) == pytest.approx(0.02)
+    watch.answered(Feedback(1050 * MS, **({"phase": Phase.UP, "state": "UP"} | unsound)))
+    assert watch.sound_for(1060 * MS) == 0.0
+    watch.answered(Feedback(1080 * MS, Phase.UP, "UP"))
+    assert watch.sound_for(1090 * MS) == pytest.approx(0.01)
+
+
+def test_before_the_planner_has_reported_nothing_is_known_of_the_source():
+    status = CueStatus()
+    assert (status.newest_ns, status.heard_ns, status.looked_ns) == (0, 0, 0)
+    assert (status.mode, status.trouble) == (DriveMode.DRIVE, "")
+
+
+def test_when_the_planner_looked_is_no_news_of_the_source():
+    assert CueStatus(5, 7, looked_ns=1) == CueStatus(5, 7, looked_ns=2)
+    assert CueStatus(5, 7, heard_ns=1) != CueStatus(5, 7, heard_ns=2)
