@@ -48,15 +48,18 @@ def inherit(guard: Guard, will: Will, now_ns: int, is_sent: bool = True) -> bool
     latched = will.state in (State.FAULT, State.SAFE)
     late = (now_ns - will.due_ns) / SECOND
     playback: Playback | None = None
-    why = ""
+    why: str | None = None
     if late > LONGEST_GAP:
         why = f"its packet was due {late * 1e3:.0f} ms ago"
     elif will.taken_ns and now_ns - will.taken_ns < QUIET * SECOND:
         why = "it had taken over itself just before"
     elif will.plans:
         found = _played(guard, will)
-        why = found if isinstance(found, str) else _astray(guard, will.feedback, found) or ""
-        playback = None if isinstance(found, str) or why else found
+        if isinstance(found, str):
+            why = found
+        else:
+            why = _astray(guard, will.feedback, found)
+            playback = None if why else found
     if why and not latched:
         record.note(now_ns, f"the guard before ended in {will.state}; begins anew: {why}")
         return False

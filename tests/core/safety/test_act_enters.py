@@ -183,3 +183,84 @@ def test_a_guard_begins_anew_with_its_tracking_when_it_is_told_something_else():
     b.guard.supervisor.device.error = 0.5
     assert b.guard.moves.start_at(ZERO, HOMES) == ""
     assert b.guard.supervisor.device.error == 0.0
+
+
+# what is known of the platform's place
+
+
+def test_where_it_was_sent_is_remembered_once_it_went_out():
+    scene = Scene(State.RUN, playback=moving())
+    first = scene.tick()
+    assert scene.record.sent_legs.tolist() == first.legs.tolist()
+    scene.guard.told(scene.now, True)
+    second = scene.tick()
+    assert scene.record.sent_legs.tolist() == second.legs.tolist()
+    scene.guard.told(scene.now, False)
+    assert scene.record.sent_legs.tolist() == first.legs.tolist()
+
+
+@pytest.mark.parametrize(
+    ("state", "phase", "more", "entered"),
+    [
+        (State.RUN, Phase.UP, {"estop": True}, State.SAFE),
+        (State.PARKING, Phase.DOWN, {}, State.PARKED),
+    ],
+)
+def test_a_device_that_moved_by_itself_is_where_nobody_sent_it(state, phase, more, entered):
+    scene = Scene(state, playback=at_rest())
+    scene.run(320)
+    scene.record.sent_legs = NEUTRAL
+    scene.phase = phase
+    scene.answer |= more
+    scene.tick(is_due=False)
+    assert scene.record.state is entered
+    assert scene.record.playback is None
+    assert scene.record.sent_legs is None
+
+
+def test_in_a_fault_what_is_waited_for_is_told_with_its_reason():
+    scene = Scene(State.RUN, playback=at_rest())
+    assert scene.guard.reason == scene.record.reason
+    scene.answer["faults"] = ("bus",)
+    scene.tick()
+    assert scene.record.state is State.FAULT
+    assert scene.guard.reason == (
+        "the device reports bus; the device is told to park as long as it reports bus"
+    )
+    scene.answer["estop"] = True
+    scene.tick()
+    assert scene.record.state is State.SAFE
+    assert scene.guard.reason == scene.record.reason, "of the fault nothing is told any more"
+
+
+# a service that ends
+
+
+def test_who_falls_into_a_fault_while_it_ends_has_the_time_that_parking_may_take():
+    scene = Scene(State.RUN, playback=at_rest())
+    scene.tick(leave=True)
+    assert scene.record.state is State.PARKING
+    scene.answer["faults"] = ("bus",)
+    scene.tick(is_due=False)
+    assert scene.record.state is State.FAULT
+    way = at_rest().newest.way_home
+    assert scene.record.deadline_ns == scene.now + int(2.0 * (1.0 + way + 10.0) * SECOND)
+
+
+def test_a_fault_of_a_service_that_stays_needs_no_bound():
+    scene = Scene(State.RUN, playback=at_rest())
+    before = scene.record.deadline_ns
+    scene.answer["faults"] = ("bus",)
+    scene.tick(is_due=False)
+    assert scene.record.state is State.FAULT
+    assert scene.record.deadline_ns == before
+
+
+def test_who_is_down_while_it_ends_has_no_new_bound():
+    scene = Scene(State.PARKING, Phase.DOWN, playback=at_rest())
+    scene.run(280)
+    scene.tick(leave=True)
+    before = scene.record.deadline_ns
+    scene.run(80)
+    assert scene.record.state is State.PARKED
+    assert scene.record.deadline_ns == before

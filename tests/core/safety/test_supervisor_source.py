@@ -291,6 +291,7 @@ def test_a_supervisor_begins_without_a_complaint():
     assert supervisor.inconsistent == ""
     assert supervisor.astray is False
     assert not supervisor.dry_run
+    assert supervisor.return_decision.status == ""
 
 
 @pytest.mark.parametrize(
@@ -376,6 +377,25 @@ def outage(seconds, pattern=None):
 @pytest.mark.parametrize("seconds", [0.2, 1.6, 2.1])
 def test_an_outage_that_is_over_before_the_hold_has_run_out_does_not_park(seconds):
     assert [state for state, _ in outage(seconds)] == [State.HOLD, State.RUN]
+
+
+def test_every_hold_has_its_own_patience():
+    """What an earlier outage was spared is not added to a later one."""
+    (_, _), (_, _), (hold, held), (end, ended) = outage(1.0, (5000, 4000))
+    assert (hold, end) == (State.HOLD, State.PARKING)
+    assert ended - held == pytest.approx(2.0, abs=0.03)
+
+
+def test_a_hold_is_spared_the_time_in_which_only_the_source_is_waited_for():
+    """After a pause plans are missing, come for 300 ms, too short for a drive, and go again."""
+    scene = held(DriveMode.PAUSE)
+    scene.run(1000)
+    scene.mode = DriveMode.DRIVE
+    for plans, ms in ((False, 60), (True, 300), (False, 1940)):
+        scene.plans = plans
+        assert scene.run(ms) is None
+    # 2.3 s of which at least 300 ms were spared, and at most 350
+    assert scene.run(60) == (State.PARKING, Event.HOLD_EXPIRED)
 
 
 def test_an_outage_that_is_longer_than_a_hold_parks():

@@ -129,6 +129,8 @@ def test_a_plan_is_packed_once_while_it_is_left_and_forgotten_after():
         ({"feedback": {"legs": [float("nan")] * 6}}, "not six numbers"),
         ({"feedback": {"legs": [1.0] * 5 + [float("nan")]}}, "not six numbers"),
         ({"feedback": {"legs": [1.0] * 5}}, "not six numbers"),
+        ({"sent_legs": [1.0] * 5}, "sent_legs are not six numbers"),
+        ({"feedback": {"legs": [1.0] * 5}}, "legs are not six numbers"),
         ({"feedback": {"estop": 0}}, "estop is 0"),
     ],
 )
