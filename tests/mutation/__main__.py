@@ -24,9 +24,25 @@ SAFETY = "motionserver/core/safety"
 SUITES = {
     "protocol/motion_protocol": ["tests/protocol"],
     f"{INTAKE}/agreement.py": ["tests/intake/test_agreement.py"],
+    f"{INTAKE}/freshness.py": ["tests/intake/test_freshness.py"],
+    f"{INTAKE}/gate.py": [
+        "tests/intake/test_gate.py",
+        "tests/intake/test_gate_limits.py",
+        "tests/intake/test_plausibility.py",
+        "tests/intake/test_sequence_order.py",
+        "tests/intake/test_spoilage.py",
+    ],
+    f"{INTAKE}/intake.py": [
+        "tests/intake/test_intake.py",
+        "tests/intake/test_intake_limits.py",
+    ],
     f"{INTAKE}/plausibility.py": [
         "tests/intake/test_gravity_at_standstill.py",
         "tests/intake/test_plausibility.py",
+    ],
+    f"{INTAKE}/ranges.py": [
+        "tests/intake/test_gate.py",
+        "tests/intake/test_gate_limits.py",
     ],
     f"{INTAKE}/sender_clock.py": [
         "tests/intake/test_gate.py",
@@ -37,6 +53,7 @@ SUITES = {
         "tests/intake/test_gate.py",
         "tests/intake/test_sequence_order.py",
     ],
+    f"{INTAKE}/spoilage.py": ["tests/intake/test_spoilage.py"],
     f"{INTAKE}/stamp_rate.py": ["tests/intake/test_stamp_rate.py"],
     f"{INTAKE}/standstill.py": ["tests/intake/test_standstill.py"],
     INTAKE: ["tests/intake"],
@@ -65,9 +82,7 @@ SUITES = {
     f"{SAFETY}/edges.py": ["tests/core/safety/test_edges.py"],
     f"{SAFETY}/ending.py": ["tests/core/safety/test_ending.py"],
     f"{SAFETY}/fault_return.py": [
-        "tests/core/safety/test_ending.py",
-        "tests/core/safety/test_fault_return.py",
-        "tests/core/safety/test_guard_resets.py",
+        "tests/core/safety/test_fault_orders.py",
     ],
     f"{SAFETY}/given.py": ["tests/core/safety/test_record.py"],
     f"{SAFETY}/inherit.py": ["tests/core/safety/test_inherit_rules.py"],
