@@ -212,6 +212,31 @@ def test_a_half_second_with_one_packet_that_cannot_be_compared_is_left_out(
     assert agreement.complaint == ""
 
 
+@pytest.mark.parametrize("pair", PAIRS)
+def test_neither_the_step_to_a_pause_nor_the_one_from_it_is_compared(pair: str) -> None:
+    """Every fifth packet pauses: three steps are left between pauses, 375 ms."""
+    agreement = Agreement()
+    value = 0.0
+    for k in range(200):
+        mode = DriveMode.PAUSE if k % 5 == 0 else DriveMode.DRIVE
+        value = 0.5 if k % 2 else 0.0
+        gain = 0.5 if k % 2 else -0.5
+        agreement.heard(packet(k, pair, value, gain, -gain, mode=mode))
+    assert agreement.complaint == ""
+
+
+def test_close_to_upright_angles_are_not_compared() -> None:
+    def found(pitch: float) -> str:
+        agreement = Agreement()
+        for told in half_seconds("turn", there_and_back(1.0, -1.0), attitude=(0.0, pitch)):
+            agreement.heard(told)
+        return agreement.complaint
+
+    for sign in (1.0, -1.0):
+        assert "lateral" in found(sign * 1.47)
+        assert found(sign * float(np.nextafter(1.47, 2.0))) == ""
+
+
 def test_comparisons_go_on_after_what_could_not_be_compared() -> None:
     agreement = Agreement()
     packets = list(half_seconds("roll", [(1.0, -1.0)] * 9))

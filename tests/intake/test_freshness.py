@@ -104,3 +104,27 @@ def test_patience_is_always_between_50_and_300_ms(gaps: list[int]) -> None:
         fresh.arrived(time)
         assert 50 * MS <= fresh.stale_after_ns() <= 300 * MS
         assert not fresh.is_stale(time)
+
+
+def test_the_usual_gap_is_the_median_and_never_nothing() -> None:
+    assert Freshness().usual_gap() == 1e-6
+    assert after(0.0, 0.0)[0].usual_gap() == 1e-6
+    assert after(10.0, 20.0, 400.0)[0].usual_gap() == 0.020
+    assert after(*[400.0] * 4, *[10.0] * 4)[0].usual_gap() == 0.400
+    assert after(*[400.0] * 4, *[10.0] * 5)[0].usual_gap() == 0.010
+
+
+@pytest.mark.parametrize(
+    ("gap", "is_slow"), [(200, False), (220, False), (221, True), (1000, True)]
+)
+def test_five_packets_a_second_are_needed(gap: float, is_slow: bool) -> None:
+    assert after(*[gap] * 5)[0].is_too_slow is is_slow
+
+
+def test_three_gaps_tell_that_a_source_is_slow_and_four_of_the_last_eight() -> None:
+    assert not Freshness().is_too_slow
+    assert not after(400.0, 400.0)[0].is_too_slow
+    assert after(400.0, 400.0, 400.0)[0].is_too_slow
+    assert not after(*[10.0] * 20, *[400.0] * 3)[0].is_too_slow
+    assert after(*[10.0] * 20, *[400.0] * 4)[0].is_too_slow
+    assert not after(*[10.0] * 20, 400.0, 10.0)[0].is_too_slow, "an outage is no rate"

@@ -121,6 +121,62 @@ def test_lost_are_exactly_the_numbers_that_never_came(loss, shuffle, begin, seed
     assert order.lost == 600 - len(sent)
 
 
+def test_before_a_packet_nothing_began_anew():
+    assert not SequenceOrder().is_restart
+    assert not Gate().is_restart
+
+
+@pytest.mark.parametrize(("last", "verdict"), [(968, "reordered"), (967, None)])
+def test_without_a_stamp_the_last_32_numbers_are_late_ones(last, verdict):
+    order, verdicts = judged(last - 2, last - 1, last, start=1000)
+    assert verdicts == ["reordered", "reordered", verdict]
+    assert order.is_restart is (verdict is None)
+
+
+def test_the_newest_1024_missing_numbers_are_waited_for():
+    order = SequenceOrder()
+    order.judge(0, 0.0, None)
+    order.judge(2000, 2000.0, None)
+    assert order.lost == 1999
+    order.judge(2000 - 1024, 1.0, True)
+    assert order.lost == 1998
+    order.judge(2000 - 1025, 1.0, True)
+    assert order.lost == 1998
+    order.judge(2002, 1.0, None)
+    order.judge(2000 - 1023, 1.0, True)
+    assert order.lost == 1998, "one more is missing, for which the oldest two are not waited for"
+
+
+@pytest.mark.parametrize("repeated", [9, 10])
+def test_a_number_that_came_was_not_lost_and_comes_twice(repeated):
+    order, _ = judged(9, 10, 12, start=8)
+    assert order.lost == 1
+    assert order.judge(repeated, 1.0, None) == "reordered"
+    assert order.lost == 1
+    assert order.judge(11, 1.0, None) == "reordered"
+    assert order.lost == 0
+
+
+def test_a_count_far_ahead_is_followed_though_its_clock_was_set_back():
+    _, verdicts = judged(5000, 5001, 5002, is_older=True, start=0)
+    assert verdicts == ["jumped", "jumped", None]
+
+
+@pytest.mark.parametrize(("step", "is_followed"), [(16, True), (17, False)])
+def test_what_goes_on_from_a_jump_may_lose_as_much_as_any_stream(step, is_followed):
+    _, verdicts = judged(5000, 5000 + step, 5000 + 2 * step, start=0)
+    assert (verdicts[-1] is None) is is_followed
+
+
+def test_what_was_missing_before_a_count_began_anew_stays_lost():
+    order, _ = judged(1, 3, start=0)
+    for k in range(3):
+        order.judge(1_000_000 + k, 1.0, None)
+    assert order.lost == 1
+    assert order.judge(2, 1.0, True) == "reordered"
+    assert order.lost == 1
+
+
 def stream(gate, begin_ms, count, first, session=1, stamps=True):
     found = []
     for k in range(count):

@@ -168,3 +168,22 @@ def test_after_a_silence_two_windows_are_waited_for_anew() -> None:
     # what was heard of the second window goes with the first
     assert hear(20, 2 * SECOND + 1 + 900 * MS) == ""
     assert hear(1, 100 * MS) != ""
+
+
+def test_a_window_that_begins_with_a_silence_begins_after_it() -> None:
+    """Two seconds and a nanosecond after its first packet; the next two seconds decide."""
+    rate, found = StampRate(), []
+    for at in (0, *(2 * SECOND + 1 + k * 100 * MS for k in range(21))):
+        rate.heard(at, 5)
+        found.append(rate.complaint)
+    assert found[:-1] == [""] * 21
+    assert found[-1] != ""
+
+
+def test_a_stamp_that_repeats_is_no_step_backwards() -> None:
+    stamps = running(1.0, 1.0)
+    for first in (0, 10):
+        stamps[first + 1] = stamps[first]
+        for k in (4, 7):
+            stamps[first + k] = stamps[first + k - 1] - 1
+    assert complaints(stamps)[-1] == ""

@@ -30,11 +30,11 @@ def felt(force: tuple[float, float, float], count: int = 21, **more: Any) -> str
     return heard([{"force": force}] * count, **(STANDS | more))
 
 
-def exactly(size: float, **more: Any) -> str:
-    """A force upwards, felt so often that the mean is that force to the last bit."""
+def exactly(size: float, forward: float = 0.0, **more: Any) -> str:
+    """A force felt so often that the mean is that force to the last bit."""
     counts = range(6, 61)
     count = next(n for n in counts if np.array([(0.0, 0.0, size)] * n).mean(axis=0)[2] == size)
-    told = [{"force": (0.0, 0.0, size)}] * count
+    told = [{"force": (forward, 0.0, size)}] * count
     return heard(told, step_ms=math.ceil(1000 / (count - 1)), **(STANDS | more))
 
 
@@ -159,28 +159,31 @@ def test_of_a_drive_only_gravity_that_is_missing_or_doubled_is_told() -> None:
         (2.0 * GRAVITY - 1.0, "check the unit (m/s2) and whether the flag GRAVITY_INCLUDED"),
         (2.0 * GRAVITY + 1.0, "check the unit (m/s2)"),
         (0.0, "gravity is missing. Clear the flag GRAVITY_INCLUDED if the values do not"),
-        (0.89, "gravity is missing"),
-        (0.91, "is it sent in g? It must be in m/s2"),
+        (0.9 - 1e-9, "gravity is missing"),
+        (0.9, "is it sent in g? It must be in m/s2"),
         (1.0, "is it sent in g?"),
-        (1.09, "is it sent in g?"),
-        (1.11, "check the unit (m/s2)"),
+        (1.1, "is it sent in g?"),
+        (1.1 + 1e-9, "check the unit (m/s2)"),
         (5.0, "check the unit (m/s2)"),
         (32.2, "check the unit (m/s2)"),
     ],
 )
 def test_the_likely_cause_is_named(size: float, said: str) -> None:
-    found = exactly(size) if abs(size - 2.0 * GRAVITY) == 1.0 else felt((0.0, 0.0, size))
+    is_edge = size in (0.9, 1.1, 2.0 * GRAVITY - 1.0, 2.0 * GRAVITY + 1.0)
+    found = exactly(size) if is_edge else felt((0.0, 0.0, size))
     assert f"at standstill the specific force is {size:.2f} m/s2" in found
     assert f": {said}" in found
 
 
 def test_without_an_attitude_a_force_that_points_up_may_be_a_slope() -> None:
     assert felt((6.0, 0.0, 7.761)) == ""
+    assert felt((9.8, 0.0, 0.5)) == ""
     assert "check axes and signs" in felt((6.0, 0.0, -7.761))
     assert "check axes and signs" in felt((9.81, 0.0, 0.0)), "on its nose or tail"
 
 
 def test_in_an_attitude_the_force_is_gravity_within_one_and_a_half() -> None:
+    assert exactly(GRAVITY, 1.5, attitude=(0.0, 0.0)) == ""
     # level but for a force sideways: as long as gravity, and so far from it
     for apart, is_right in ((1.499, True), (1.501, False)):
         lean = 2.0 * math.asin(apart / 2.0 / GRAVITY)

@@ -43,6 +43,7 @@ SUITES = {
     f"{INTAKE}/ranges.py": [
         "tests/intake/test_gate.py",
         "tests/intake/test_gate_limits.py",
+        "tests/intake/test_ranges.py",
     ],
     f"{INTAKE}/sender_clock.py": [
         "tests/intake/test_gate.py",

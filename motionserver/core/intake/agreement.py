@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from motionserver.core.intake.freshness import MS, SECOND_NS
+from motionserver.core.intake.freshness import MS
 from motionserver.core.kinematics.rotation import gravity_in_body
 from motionserver.core.state import DriveMode, VehicleMotion
 
-STEP_NS: Final = SECOND_NS // 2
+STEP_NS: Final = 500 * MS
 """Length of one comparison [ns]."""
 KEPT: Final = 20
 """Comparisons that are judged together."""
@@ -34,8 +34,8 @@ ALIKE: Final = 0.9
 FASTER: Final = 5.0
 """Speed above which speed and acceleration are compared: nobody reverses at it [m/s]."""
 _GAP_NS: Final = 200 * MS
-_STEEP: Final = 0.1
-"""Cosine of the pitch below which angles are not integrated."""
+_STEEP: Final = 1.47
+"""Pitch beyond which angles are not integrated: roll is hardly known there [rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class _Sums:
         elapsed = (motion.arrival_ns - last.arrival_ns) * 1e-9
         p, q, r = (0.5 * (last.rates + motion.rates)).tolist()
         gravity = None
-        if last.attitude is None or motion.attitude is None or cos(motion.attitude[1]) < _STEEP:
+        if last.attitude is None or motion.attitude is None or abs(motion.attitude[1]) > _STEEP:
             self.usable[:2] = False
         else:
             roll, pitch = motion.attitude
@@ -135,15 +135,15 @@ def _goes_on(last: VehicleMotion, motion: VehicleMotion) -> bool:
     return both_drive and motion.arrival_ns - last.arrival_ns < _GAP_NS
 
 
-def _judged(pair: _Pair, found: deque[tuple[float, float]]) -> str:
+def _judged(pair: _Pair, found: deque[tuple[float, float]]) -> str | None:
     if len(found) < FEWEST:
-        return ""
+        return None
     first, second = np.array(found).T
     sizes = np.sqrt(np.mean(first**2)), np.sqrt(np.mean(second**2))
     large, small = max(sizes), min(sizes)
     if large < pair.least or small < 1e-3 * large:
         # too little to tell, or one of the two is not told at all
-        return ""
+        return None
     like = float(np.mean(first * second)) / float(large * small)
     if like <= OPPOSITE:
         return (
@@ -156,7 +156,7 @@ def _judged(pair: _Pair, found: deque[tuple[float, float]]) -> str:
             f"({sizes[0]:.2g} and {sizes[1]:.2g} {pair.unit} in half a second): a unit is wrong "
             f"({pair.remedy})"
         )
-    return ""
+    return None
 
 
 PREVIEW_APART: Final = 4.0

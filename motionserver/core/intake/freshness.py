@@ -45,8 +45,8 @@ class Freshness:
 
         Of an outage in a quick stream nothing is seen here.
         """
-        gaps = sorted(self._gaps) or [0]
-        return max(1e-6, gaps[len(gaps) // 2] / SECOND_NS)
+        gaps = sorted(self._gaps)
+        return max(1e-6, gaps[len(gaps) // 2] / SECOND_NS if gaps else 0.0)
 
     @property
     def newest_ns(self) -> int | None:

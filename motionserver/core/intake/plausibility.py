@@ -47,9 +47,9 @@ class Plausibility:
         """What is wrong, and what it may be; empty if nothing is, or too little was heard."""
         return self._standstill.complaint or self._of_medians() or self._agreement.complaint
 
-    def _of_medians(self) -> str:
+    def _of_medians(self) -> str | None:
         if len(self._seen) < LEAST * SECOND_NS // _EVERY_NS:
-            return ""
+            return None
         force = median(one[1] for one in self._seen)
         rate = median(one[2] for one in self._seen)
         if not FORCE[0] <= force <= FORCE[1]:
@@ -62,4 +62,4 @@ class Plausibility:
                 f"the body rate is {rate:.1f} rad/s in the median of {SPAN} s, a vehicle has less "
                 f"than {RATE:.0f}: is it sent in rad/s?"
             )
-        return ""
+        return None

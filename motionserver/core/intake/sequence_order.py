@@ -63,8 +63,8 @@ class SequenceOrder:
             self._newest, self._jump = sequence, None
             return None
         behind = _WORLD - ahead
-        is_behind = behind <= _WORLD // 2
-        was_missing = is_behind and sequence in self._missing
+        is_behind = behind <= 1 << 31
+        was_missing = sequence in self._missing
         if was_missing:
             del self._missing[sequence]
             self.lost -= 1
@@ -81,19 +81,19 @@ class SequenceOrder:
 
     def _skip(self, newest: int, ahead: int) -> None:
         self.lost += ahead - 1
-        for number in range(newest + 1 + max(0, ahead - 1 - MOST_MISSING), newest + ahead):
-            self._missing[number % _WORLD] = None
+        for step in range(max(1, ahead - MOST_MISSING), ahead):
+            self._missing[(newest + step) % _WORLD] = None
         while len(self._missing) > MOST_MISSING:
             del self._missing[next(iter(self._missing))]
 
     def _goes_on(self, sequence: int) -> bool:
         """Whether enough packets in a row have followed a jump; note this one."""
+        count = 1
         if self._jump is not None:
-            at, count = self._jump
+            at, before = self._jump
             if sequence == at:
                 return False
             if (sequence - at) % _WORLD <= ALWAYS_AHEAD:
-                self._jump = (sequence, count + 1)
-                return count + 1 >= FEW
-        self._jump = (sequence, 1)
-        return False
+                count += before
+        self._jump = (sequence, count)
+        return count >= FEW

@@ -116,11 +116,11 @@ def _cause(size: float) -> str:
             "gravity is counted twice. The values contain it: set the flag GRAVITY_INCLUDED "
             "(Python: send specific_force=), or send acceleration that is zero at rest"
         )
-    if size < 1.0 and abs(size - 1.0) > 0.1:
+    if size < 0.9:
         return (
             "gravity is missing. Clear the flag GRAVITY_INCLUDED if the values do not contain it "
             "(Python: send acceleration=); if they do, z must point up"
         )
-    if abs(size - 1.0) <= 0.1:
+    if size <= 1.1:
         return "is it sent in g? It must be in m/s2"
     return "check the unit (m/s2) and whether the flag GRAVITY_INCLUDED is true"
