@@ -48,6 +48,7 @@ SUITES = {
     f"{INTAKE}/sender_clock.py": [
         "tests/intake/test_gate.py",
         "tests/intake/test_gate_limits.py",
+        "tests/intake/test_lateness.py",
         "tests/intake/test_sender_clock.py",
     ],
     f"{INTAKE}/sequence_order.py": [

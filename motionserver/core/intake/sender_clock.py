@@ -60,7 +60,7 @@ class _Delay:
             return False
         if self._pause is not None:
             self._pause.late += 1
-        if late > self._explained + interval + limit // 2:
+        if 2 * (late - self._explained - interval) > limit:
             if late - before > limit and not self._is_doubted:
                 # one stamp alone may be a slip of its sender
                 self._is_doubted, self._late = True, before
