@@ -102,7 +102,7 @@ class HandoverClock:
     def handover(self, now_ns: int, expected_ns: int) -> Handover | None:
         """Choose parent and instant for a plan that will be ready in ``expected_ns`` [ns]."""
         clock = self.clock
-        if clock is None or STATES[clock.state] not in CUED or clock.newest_id == 0:
+        if clock is None or STATES[clock.state] not in CUED:
             return None
         if now_ns - clock.due_ns > max(self._period_ns, STANDS_NS):
             # a plan for an instant guessed from the time that passes would wait for it too long

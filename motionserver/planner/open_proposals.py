@@ -9,7 +9,7 @@ from motionserver.core.plan import Plan
 from motionserver.telemetry.link import GuardClock
 from motionserver.telemetry.ticker import SLOWEST_TICK_HZ
 
-READ_NS: Final = round(2e9 / SLOWEST_TICK_HZ)
+READ_NS: Final = int(2 * 10**9 / SLOWEST_TICK_HZ)
 """A guard that ticks has read a proposal after this time [ns]."""
 
 

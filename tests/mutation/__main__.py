@@ -67,7 +67,7 @@ SUITES = {
     "motionserver/core/motion": ["tests/core/motion"],
     "motionserver/guard/send_grid.py": ["tests/guard/test_send_grid.py"],
     "motionserver/planner/handover.py": ["tests/planner/test_handover.py"],
-    "motionserver/planner/open_proposals.py": ["tests/planner/test_handover.py"],
+    "motionserver/planner/open_proposals.py": ["tests/planner/test_open_proposals.py"],
     f"{SAFETY}/patient.py": ["tests/core/safety/test_patient.py"],
     f"{SAFETY}/slices.py": ["tests/core/safety/test_slices.py"],
     f"{SAFETY}/accept.py": [

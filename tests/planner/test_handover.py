@@ -12,11 +12,11 @@ from motionserver.core.plan import Plan, pack, rest_at
 from motionserver.core.safety.states import State
 from motionserver.core.safety.verdict import Reason
 from motionserver.core.safety.verify import CLOSEST
-from motionserver.planner.handover import ALIVE_NS, FALL_NS, KEPT, Handover, HandoverClock
-from motionserver.planner.open_proposals import READ_NS
+from motionserver.planner.handover import Handover, HandoverClock
 from motionserver.telemetry.link import REASONS, STATES, GuardClock, Maps
 
 MS = 1_000_000
+ALIVE_NS, FALL_NS = 200 * MS, 2000 * MS
 PERIOD = 1 / 60
 
 
@@ -79,6 +79,7 @@ def test_a_guard_that_fell_silent_is_none(scene: Scene) -> None:
     scene.guard(State.RUN, rest_at(np.zeros(6), 5))
     assert scene.clock.read(ALIVE_NS) is State.RUN
     assert scene.clock.read(ALIVE_NS + 1) is None
+    assert scene.clock.clock is None
     assert scene.clock.handover(ALIVE_NS + 1, 0) is None
 
 
@@ -200,7 +201,7 @@ def test_a_slot_reached_by_adding_periods_is_not_missed_by_rounding(scene: Scene
     scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=at)
     found = scene.handover(0, 33 * MS)
     assert found is not None
-    assert found.takeover >= at + PERIOD
+    assert found.takeover - (at + PERIOD) == pytest.approx(1e-8, rel=1e-3)
 
 
 def in_time(plan_id: int, parent: int, takeover: float) -> Plan:
@@ -271,9 +272,9 @@ def test_a_plan_is_held_back_while_it_would_replace_its_own_parent(scene: Scene)
     scene.handover()
     scene.clock.proposed(in_time(6, 5, 0.5), 0)
     child = in_time(7, 6, 0.02)
-    assert not scene.clock.may_propose(child, READ_NS - 1)
-    # a guard that ticks has read it by then
-    assert scene.clock.may_propose(child, READ_NS)
+    assert not scene.clock.may_propose(child, 8_333_332)
+    # two ticks at 240 Hz: a guard that ticks has read it by then
+    assert scene.clock.may_propose(child, 8_333_333)
     assert scene.clock.may_propose(in_time(7, 5, 0.5), 0)
     scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, taken=6)
     assert scene.clock.may_propose(child, 0)
@@ -282,5 +283,135 @@ def test_a_plan_is_held_back_while_it_would_replace_its_own_parent(scene: Scene)
 def test_only_the_newest_proposals_are_remembered(scene: Scene) -> None:
     for k in range(10, 60):
         scene.clock.proposed(plan(k, k - 1))
-    assert len(scene.clock._plans) == KEPT
+    assert len(scene.clock._plans) == 16
     assert max(scene.clock._plans) == 59
+
+
+def test_before_a_guard_is_heard_there_is_little_to_show(scene: Scene) -> None:
+    assert scene.clock.shown() == {
+        "lead_slots": 0,
+        "last_refusal": None,
+        "waiting": 0,
+        "periods_waited": 0,
+    }
+    assert not scene.clock.may_propose(plan(6, 5), 0)
+
+
+def test_what_the_page_tells_of_the_hand_over(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, Reason.TOO_LATE, 1)
+    scene.clock.proposed(plan(200, 5), MS)
+    scene.clock.proposed(plan(201, 200), MS)
+    rest = rest_at(np.zeros(6), 5)
+    clock = GuardClock(STATES.index(State.RUN), 5, 0.0, 0, 16 * MS, MS, waiting=2, late_count=1)
+    scene.maps.accepted.write(pack(rest))
+    scene.maps.clock.write(clock.pack())
+    assert scene.handover(MS) is None
+    assert scene.clock.shown() == {
+        "lead_slots": 1,
+        "last_refusal": Reason.TOO_LATE,
+        "waiting": 2,
+        "periods_waited": 1,
+    }
+
+
+def test_before_a_plan_was_accepted_there_is_no_parent(scene: Scene) -> None:
+    scene.maps.clock.write(GuardClock(STATES.index(State.RUN), 5, 0.0, 0, 16 * MS, 0).pack())
+    assert scene.handover() is None
+    scene.maps.accepted.write(pack(rest_at(np.zeros(6), 5)))
+    assert scene.handover() is not None
+
+
+@pytest.mark.parametrize(
+    ("periods", "slots"), [(None, 2), (1.0, 2), (0.25, 2), (2.0, 5), (4.0, 11)]
+)
+def test_no_plan_waits_longer_than_the_guard_lets_plans_wait(
+    scene: Scene, periods: float | None, slots: int
+) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    clock = HandoverClock(scene.maps, PERIOD, None if periods is None else periods * PERIOD)
+    clock.read(0)
+    found = clock.handover(0, 1000 * MS)
+    assert found is not None
+    assert found.takeover == pytest.approx(0.4 + slots * PERIOD)
+
+
+def test_a_lead_is_so_many_slots_further(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, Reason.TOO_LATE, 1)
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, judged=OURS)
+    found = scene.handover()
+    assert found is not None
+    assert found.takeover == pytest.approx(0.4 + PERIOD)
+
+
+def test_a_lead_falls_two_seconds_after_it_rose_or_fell(scene: Scene) -> None:
+    def lead(at_ns: int, judged: int = 0, why: Reason | None = None) -> int:
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), now=at_ns, judged=judged, why=why)
+        scene.handover(at_ns)
+        return scene.clock.lead
+
+    begin = 10_000 * MS
+    assert lead(begin) == 0
+    for k in range(2):
+        scene.clock.proposed(plan(OURS + k, 5), begin)
+        assert lead(begin, OURS + k, Reason.TOO_LATE) == k + 1
+    assert [lead(begin + 2000 * MS + ns) for ns in (-1, 0)] == [2, 1]
+    assert [lead(begin + 4000 * MS + ns) for ns in (-1, 0)] == [1, 0]
+    assert lead(begin + 9000 * MS) == 0
+
+
+def test_the_last_refusal_is_kept_when_a_plan_is_accepted(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    refused(scene, Reason.LEG_JERK, 1)
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5))
+    scene.handover()
+    assert scene.clock.last_refusal is Reason.LEG_JERK
+
+
+@pytest.mark.parametrize(("check_ms", "patience_ns"), [(0, 16_666_667), (5, 26_666_667)])
+def test_a_verdict_is_waited_for_a_period_and_twice_the_check(
+    scene: Scene, check_ms: int, patience_ns: int
+) -> None:
+    clock = HandoverClock(scene.maps, PERIOD, check_ns=check_ms * MS)
+    for late, parent in ((0, 6), (1, 5)):
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=10 * MS)
+        clock.read(10 * MS)
+        # of now, or of the last reading
+        clock.proposed(in_time(6, 5, 0.6), *(() if late else (10 * MS,)))
+        now = 10 * MS + patience_ns + late
+        scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=now)
+        clock.read(now)
+        found = clock.handover(now, 0)
+        assert found is not None
+        assert found.parent.plan_id == parent
+
+
+@pytest.mark.parametrize(
+    ("check_ms", "now_ms", "slots"), [(0, 1, 0), (15, 1, 0), (20, 1, 1), (20, 35, 2), (40, 1, 2)]
+)
+@pytest.mark.parametrize(("early", "parent"), [(0.0, 6), (1e-9, 5)])
+def test_a_proposal_is_continued_if_it_is_in_time_when_it_is_decided_about(
+    scene: Scene, check_ms: int, now_ms: int, slots: int, early: float, parent: int
+) -> None:
+    """The next packet is due in 16.7 ms; a verdict comes after the check, or now if it is over."""
+    clock = HandoverClock(scene.maps, PERIOD, check_ns=check_ms * MS)
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.5)
+    clock.read(0)
+    clock.proposed(in_time(6, 5, 0.5 + slots * PERIOD - early), 0)
+    clock.read(now_ms * MS)
+    found = clock.handover(now_ms * MS, 0)
+    assert found is not None
+    assert found.parent.plan_id == parent
+
+
+def test_a_proposal_that_continues_another_plan_is_no_parent(scene: Scene) -> None:
+    scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4)
+    scene.handover()
+    scene.clock.proposed(in_time(6, 4, 0.6), 0)
+    found = scene.handover(MS)
+    assert found is not None
+    assert found.parent.plan_id == 5
