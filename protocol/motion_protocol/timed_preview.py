@@ -119,8 +119,8 @@ def unpack_timed_preview(data: bytes, offset: int, length: int) -> TimedPreview:
     return TimedPreview(times, samples)
 
 
-def _complaint(units: list[int], times: tuple[float, ...]) -> str:
-    """What is wrong with instants, in units of `UNIT` and in seconds; empty if nothing is."""
+def _complaint(units: list[int], times: tuple[float, ...]) -> str | None:
+    """What is wrong with instants, in units of `UNIT` and in seconds; None if nothing is."""
     allowed = f"allowed are increasing times from 0 to {LATEST * UNIT:g} s, 0.1 ms apart at least"
     for index, unit in enumerate(units):
         if not 0 <= unit <= LATEST:
@@ -131,4 +131,4 @@ def _complaint(units: list[int], times: tuple[float, ...]) -> str:
                 f"sample {index} at {times[index]:.6g} s does not come after the one before it at "
                 f"{times[index - 1]:.6g} s; {allowed}"
             )
-    return ""
+    return None

@@ -114,6 +114,14 @@ def test_chosen_instants_are_close_at_first_and_reach_to_the_end(horizon, count,
     assert later == pytest.approx([0.09] * 20)
 
 
+@pytest.mark.parametrize(("horizon", "count"), [(0.29, 29), (0.57, 40), (0.4, 40), (0.389, 38)])
+def test_chosen_instants_do_not_hang_on_rounding(horizon, count):
+    times = preview_times(horizon)
+    assert len(times) == count
+    if horizon <= 0.4:
+        assert times == tuple(0.01 * step for step in range(1, count + 1))
+
+
 @pytest.mark.parametrize("horizon", [-0.1, 4.001, float("nan"), float("inf")])
 def test_a_horizon_out_of_range_is_refused(horizon):
     with pytest.raises(ValueError, match="give a time from 0 to 4 s"):

@@ -31,7 +31,7 @@ from motion_protocol.blocks import DRIVER_LAYOUT, MOTION_LAYOUT, PREVIEW, PREVIE
 from motion_protocol.cue import CUE
 from motion_protocol.framing import BLOCK_HEAD, HEADER, block, close_frame
 from motion_protocol.layout import Layout
-from motion_protocol.status import BODY
+from motion_protocol.status import BODY, STATUS_KIND
 
 KEY = bytes(range(32))
 HEAD = {"session": 1, "sequence": 2, "sim_time_ns": 3, "sender_time_ns": 4}
@@ -39,6 +39,10 @@ SAMPLE = (1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
 DRIVE = Cue(motion=Motion((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)), **HEAD)
 OPTIONAL = 0x0005
 """A block type that nobody knows and nobody needs to."""
+
+
+def test_a_packet_is_of_the_protocols_own_version_unless_told():
+    assert list(bye(b"")[4:6]) == [1, 0]
 
 
 def bye(payload, key=None, flags=0):
@@ -163,5 +167,45 @@ def test_notice_text_of_240_bytes_is_written_and_one_more_is_not():
     status = Status(*range(1, 12), 0.5, PlatformState.RUN, notices=Notices.TOO_SLOW)
     longest = replace(status, notice_text="é" * 120)
     assert decode_status(encode_status(longest)).notice_text == "é" * 120
-    with pytest.raises(FieldError, match=r"notice.text has 241 bytes, at most 240 fit"):
+    with pytest.raises(FieldError, match=r"notice.text has 241 bytes, at most 240 fit") as refusal:
         encode_status(replace(status, notice_text="é" * 120 + "e"))
+    assert refusal.value.field == "notice.text"
+
+
+def test_every_kind_of_notice_has_its_bit():
+    assert {kind.name: kind.value for kind in Notices} == {
+        "SENDER_TIME": 1, "TOO_SLOW": 2, "VALUES": 4, "OUT_OF_RANGE": 8, "BAD_SHARE": 16,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("notices", "text"),
+    [
+        (Notices.NONE, "in words only"),
+        (Notices.VALUES, ""),
+        (Notices(1 << 15), "a newer kind"),
+        (Notices.NONE, ""),
+    ],
+)
+def test_a_notice_of_kinds_or_words_alone_is_a_notice(notices, text):
+    status = Status(*range(1, 12), 0.5, PlatformState.RUN, notices, text)
+    data = encode_status(status)
+    assert data[5] == (1 if notices or text else 0)
+    assert decode_status(data) == status
+
+
+def test_kinds_of_notices_that_do_not_fit_are_named():
+    status = Status(*range(1, 12), 0.5, PlatformState.RUN, Notices(1 << 16))
+    with pytest.raises(FieldError, match=r"notice.kinds") as refusal:
+        encode_status(status)
+    assert refusal.value.field == "notice.kinds"
+
+
+def test_words_of_a_notice_that_are_no_utf_8_are_shown_as_well_as_can_be():
+    status = encode_status(Status(*range(1, 12), 0.5, PlatformState.RUN))
+    payload = status[44:] + block(65, bytes([2, 0, 0, 0]) + b"2 \xff Hz")
+    data = close_frame(
+        STATUS_KIND, payload, None, flags=0, mode=0, session=1, sequence=2, sim_time_ns=3,
+        sender_time_ns=4, minor=1,
+    )  # fmt: skip
+    assert decode_status(data).notice_text == "2 \N{REPLACEMENT CHARACTER} Hz"

@@ -90,8 +90,8 @@ class FaultReturn:
             return True
         return record.leaving and newest is not None and not newest.estop
 
-    def _go_home(self, step: Step) -> str:
-        """Begin the way home; what forbids it, empty if nothing does."""
+    def _go_home(self, step: Step) -> str | None:
+        """Begin the way home; what forbids it, None if nothing does."""
         record = self._record
         refusal = self._moves.start_from_measured() if step is Step.BEGIN else ""
         if refusal:
@@ -102,4 +102,4 @@ class FaultReturn:
         if isinstance(ahead, str):
             return ahead
         record.playback = ahead
-        return ""
+        return None

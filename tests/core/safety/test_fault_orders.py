@@ -142,6 +142,16 @@ def test_the_way_home_is_tracked_anew():
     assert not scene.guard.supervisor.astray, "it is borne for a while"
 
 
+def test_on_the_way_home_an_error_of_before_is_not_shown_for_one_that_is_not_measured():
+    scene = stands(playback=at_rest(LIFTED), legs=RAISED_LEGS)
+    device = scene.guard.supervisor.device
+    device.track(scene.now, RAISED_LEGS + 0.02, ZERO)
+    assert device.error == pytest.approx(0.02)
+    scene.answer["legs"] = None
+    assert orders(scene, 1004) == [Order.WAIT, Order.FOLLOW]
+    assert device.error == 0.0
+
+
 # resets and stops
 
 
