@@ -264,3 +264,14 @@ def test_who_is_down_while_it_ends_has_no_new_bound():
     scene.run(80)
     assert scene.record.state is State.PARKED
     assert scene.record.deadline_ns == before
+
+
+def test_a_reset_that_has_no_effect_in_its_time_is_told():
+    scene = Scene(State.FAULT)
+    scene.answer["faults"] = ("bus",)
+    scene.tick(ops=("reset",))
+    scene.run(1996)
+    assert "no effect" not in scene.guard.reason
+    scene.tick()
+    assert "a reset had no effect for 2 s" in scene.guard.reason
+    assert scene.record.reset_until_ns == 0
