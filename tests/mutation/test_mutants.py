@@ -1,5 +1,7 @@
 """The mutants of a source file: what is changed, what is left alone, and names that last."""
 
+import os
+import subprocess
 import sys
 
 import pytest
@@ -100,3 +102,20 @@ def test_every_named_mutant_exists_and_has_a_reason():
     assert files <= set(files_under([]))
     assert known.keys() <= {mutant.name for file in files for mutant in mutants_of(ROOT, file)}
     assert all(len(reason) > 20 for reason in known.values())
+
+
+def test_the_tool_tries_a_mutant_in_its_own_process():
+    """However many workers tests have by default: those would run the code as it is."""
+    paths = os.pathsep.join(str(ROOT / part) for part in (".", "protocol", "clients", "tests"))
+    command = ["mutation", "run", "protocol/motion_protocol/sequence.py"]
+    chosen = ["--match", "newer - older -> newer + older"]
+    tests = ["--tests", "tests/protocol/test_codec.py", "--workers", "1"]
+    done = subprocess.run(
+        [sys.executable, "-m", *command, *chosen, *tests],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": paths},
+        text=True,
+        capture_output=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 tried" in done.stdout

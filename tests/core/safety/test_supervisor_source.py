@@ -10,7 +10,7 @@ from motionserver.core.device import Feedback, Phase
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.source_reason import source_reason
 from motionserver.core.safety.states import Event, State
-from motionserver.core.safety.supervisor import Supervisor, is_standing
+from motionserver.core.safety.supervisor import Supervisor, is_standing, no_plan_reason
 from motionserver.core.safety.verdict import Reason, Rejection
 from motionserver.core.safety.watchdog import CueStatus, Patience
 from motionserver.core.state import DriveMode
@@ -409,3 +409,12 @@ def test_a_source_that_comes_and_goes_parks_in_the_end(pattern, most):
     (_, held), (state, parked) = outage(0.2, pattern)
     assert state is State.PARKING
     assert 2.0 < parked - held <= most
+
+
+def test_of_many_plans_that_were_refused_the_newest_is_told():
+    record = GuardRecord(accepted_ns=5)
+    for at, why in ((6, Reason.TOO_LATE), (7, Reason.LEG_JERK), (8, Reason.WRONG_PARENT)):
+        record.rejections.append((at, Rejection(why)))
+    assert str(Rejection(Reason.WRONG_PARENT)) in no_plan_reason(record)
+    record.accepted_ns = 8
+    assert no_plan_reason(record) == "no plan came from the planner"
