@@ -120,3 +120,50 @@ def test_an_attitude_beyond_pi_or_half_of_it_is_none(roll, pitch, is_attitude):
     refusal = gate.refuse(*A, motion(attitude=(roll, pitch)))
     assert refusal == (None if is_attitude else "out-of-range")
     assert ("degrees" in gate.last_refusal) is not is_attitude
+
+
+@pytest.mark.parametrize(("ahead", "verdict"), [(46, None), (47, "jumped")])
+def test_three_times_as_many_packets_may_be_lost_as_usually_come_in_a_gap(ahead, verdict):
+    """100 a second, 100 ms: 30, and 16 in any case."""
+    gate = Gate()
+    for k in range(101):
+        gate.refuse(*A, motion(10.0 * k, k))
+    assert gate.refuse(*A, motion(1100.0, 100 + ahead)) == verdict
+
+
+def test_a_silent_owner_that_returns_on_another_port_takes_its_drive_back():
+    asked = []
+
+    def is_same(owner, who):
+        asked.append((owner.address, who.address))
+        return who.address == B[1]
+
+    gate = Gate(lambda: False, is_same_game=is_same)
+    gate.refuse(*A, motion(0.0, 1))
+    assert gate.refuse(*B, motion(1000.0, 1)) == "second-client"
+    assert gate.refuse("native", "10.0.0.3:5", motion(2500.0, 1)) == "second-client"
+    assert gate.refuse(*B, motion(2501.0, 1)) is None
+    assert asked == [(A[1], "10.0.0.3:5"), (A[1], B[1])]
+
+
+def test_an_owner_is_silent_before_its_first_packet_and_two_seconds_after_its_last():
+    gate = Gate()
+    assert gate.is_silent(0) is True
+    gate.refuse(*A, motion(0.0, 1))
+    assert gate.is_silent(2000 * MS) is False
+    assert gate.is_silent(2000 * MS + 1) is True
+
+
+def test_an_owner_that_sends_too_rarely_is_not_believed():
+    gate = Gate()
+    for k in range(8):
+        gate.refuse(*A, motion(250.0 * k, k))
+    assert not gate.is_fresh(1750 * MS)
+    assert gate.believed_ns(1750 * MS, is_cued=True) == 0
+
+
+def test_no_packet_was_refused_before_the_first():
+    gate = Gate()
+    assert gate.last_refusal == ""
+    gate.refuse(*A, motion(0.0, 1, x=200.0))
+    assert "beyond 10 g" in gate.last_refusal

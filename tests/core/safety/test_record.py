@@ -21,6 +21,7 @@ def test_a_new_guard_knows_nothing_and_has_promised_nothing():
     assert not record.rejections
     assert (record.judged_id, record.refusal) == (0, None)
     assert record.sent_legs is None
+    assert record.reset_failure == ""
 
 
 def test_the_guards_own_plans_have_the_upper_half_of_the_numbers_to_themselves():
