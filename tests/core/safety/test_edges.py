@@ -9,7 +9,7 @@ from motionserver.core.axes import frozen
 from motionserver.core.device import Feedback, Phase
 from motionserver.core.motion.moves import rest_to_rest
 from motionserver.core.motion.player import Playback
-from motionserver.core.safety.edges import edges
+from motionserver.core.safety.edges import edges, judge_reset
 from motionserver.core.safety.given import GuardConfig, Request, TickInput
 from motionserver.core.safety.record import GuardRecord
 from motionserver.core.safety.states import Event, State
@@ -170,3 +170,35 @@ def test_where_nothing_is_latched_there_is_nothing_to_reset(state):
     scene = Scene(state)
     assert scene.ask("reset")[0] == (f"the state is {state}; there is nothing to reset",)
     assert scene.record.reset_until_ns == 0
+
+
+def test_a_reset_without_effect_is_told_once_when_its_time_is_over():
+    scene = Scene(State.FAULT)
+    assert scene.ask("reset") == (("",), frozenset())
+    over = NOW + 2_000_000_000
+
+    def judge(now):
+        scene.supervisor.device.answered(Feedback(now, Phase.UP, "UP", faults=("bus",)))
+        judge_reset(Patience(), scene.record, scene.supervisor, now)
+        return scene.record.reset_failure
+
+    told = "a reset had no effect for 2 s: the device reports bus"
+    assert judge(over - 1) == ""
+    assert scene.record.reset_until_ns == over
+    assert judge(over) == told
+    assert scene.record.reset_until_ns == 0
+    assert list(scene.record.events) == [(over, told)]
+    judge(over + 1)
+    assert len(scene.record.events) == 1
+    # a further one is tried afresh
+    assert scene.ask("reset") == (("",), frozenset())
+    assert scene.record.reset_failure == ""
+
+
+def test_where_no_reset_was_asked_for_none_had_no_effect():
+    scene = Scene(State.FAULT)
+    judge_reset(Patience(), scene.record, scene.supervisor, NOW)
+    assert not scene.record.events
+    scene.record.reset_until_ns = 1
+    judge_reset(Patience(), scene.record, scene.supervisor, NOW)
+    assert scene.record.events

@@ -332,3 +332,12 @@ def test_before_the_planner_has_reported_nothing_is_known_of_the_source():
 def test_when_the_planner_looked_is_no_news_of_the_source():
     assert CueStatus(5, 7, looked_ns=1) == CueStatus(5, 7, looked_ns=2)
     assert CueStatus(5, 7, heard_ns=1) != CueStatus(5, 7, heard_ns=2)
+
+
+def test_an_excuse_that_tells_of_no_stall_moves_no_tracking_error():
+    device = watch()
+    device.answered(answer(1000, legs=ZERO + 0.02))
+    assert not device.track(1000 * MS, ZERO, ZERO)
+    device.excuse(1050 * MS)
+    assert not device.track(1100 * MS, ZERO, ZERO)
+    assert device.track(1101 * MS, ZERO, ZERO)
