@@ -128,3 +128,8 @@ def test_three_gaps_tell_that_a_source_is_slow_and_four_of_the_last_eight() -> N
     assert not after(*[10.0] * 20, *[400.0] * 3)[0].is_too_slow
     assert after(*[10.0] * 20, *[400.0] * 4)[0].is_too_slow
     assert not after(*[10.0] * 20, 400.0, 10.0)[0].is_too_slow, "an outage is no rate"
+
+
+def test_the_newest_packet_is_the_one_that_came_last() -> None:
+    fresh, now = after(10.0, 20.0, 30.0)
+    assert fresh.newest_ns == now == 1060 * MS

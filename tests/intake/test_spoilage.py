@@ -107,3 +107,10 @@ def test_before_the_first_owner_nobody_spoils() -> None:
     gate.refuse(*A, motion(0.0, 1))
     assert gate.is_fresh(0)
     assert gate.spoilage.share(0) == 0.0
+
+
+def test_of_nothing_or_of_what_is_long_past_no_share_is_bad() -> None:
+    assert Spoilage().share(5 * SECOND_NS) == 0.0
+    spoilage, now = after(*[True] * 20)
+    assert spoilage.is_spoilt(now)
+    assert spoilage.share(now + 3 * SECOND_NS) == 0.0
