@@ -105,3 +105,15 @@ def test_what_is_long_past_is_forgotten_and_an_heir_begins_anew() -> None:
     assert wrong.refuse(*OWNER, heir) is None
     assert wrong.plausibility.complaint() == ""
     assert np.isclose(13_000 * MS, heir.arrival_ns)
+
+
+def test_who_has_wrong_units_is_told_as_one_of_whom_nothing_came() -> None:
+    gate = heard(6.0, (0.1, 0.0, 1.0))
+    assert gate.believed_ns(5990 * MS, is_cued=False) == 0
+
+
+def test_what_was_wrong_before_a_silence_is_forgotten() -> None:
+    gate = heard(6.0, (0.1, 0.0, 1.0))
+    assert gate.plausibility.complaint()
+    assert gate.refuse(*OWNER, motion(5990.0 + 2001.0, 600)) is None
+    assert gate.plausibility.complaint() == ""

@@ -226,3 +226,14 @@ def test_packets_refused_as_old_or_out_of_range_are_not_lost():
     assert gate.refuse(*A, motion(1310.0, 130, sent_ms=1307.0, x=200.0)) == "out-of-range"
     assert gate.refuse(*A, motion(1320.0, 131, sent_ms=1317.0)) is None
     assert gate.lost == 0
+
+
+def test_a_client_that_restarts_is_heard_though_its_clock_stood_still():
+    """Half a second passed here, a hundredth in its clock: of another run that tells nothing."""
+    gate = Gate()
+    stream(gate, 0.0, 100, 360_000)
+    found = []
+    for k in range(6):
+        found.append(gate.refuse(*A, motion(1500.0 + 10.0 * k, k, sent_ms=997.0 + 10.0 * k)))
+        assert gate.is_restart is (k == 2)
+    assert found == ["reordered", "reordered", None, None, None, None]
