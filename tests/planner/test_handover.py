@@ -376,12 +376,13 @@ def test_the_last_refusal_is_kept_when_a_plan_is_accepted(scene: Scene) -> None:
 def test_a_verdict_is_waited_for_a_period_and_twice_the_check(
     scene: Scene, check_ms: int, patience_ns: int
 ) -> None:
-    clock = HandoverClock(scene.maps, PERIOD, check_ns=check_ms * MS)
+    known = {"check_ns": check_ms * MS} if check_ms else {}
+    clock = HandoverClock(scene.maps, PERIOD, **known)
     for late, parent in ((0, 6), (1, 5)):
         scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=10 * MS)
         clock.read(10 * MS)
         # of now, or of the last reading
-        clock.proposed(in_time(6, 5, 0.6), *(() if late else (10 * MS,)))
+        clock.proposed(in_time(6, 5, 0.6), *((10 * MS,) if late else ()))
         now = 10 * MS + patience_ns + late
         scene.guard(State.RUN, rest_at(np.zeros(6), 5), at=0.4, now=now)
         clock.read(now)

@@ -58,6 +58,12 @@ def test_a_verdict_about_a_child_is_one_about_its_parent() -> None:
         assert (newest(chain), chain.are_too_many) == (8, False)
 
 
+def test_a_verdict_about_the_only_one_leaves_none() -> None:
+    alone = waiting((6, 5))
+    alone.forget(clock(judged=6), 1003)
+    assert newest(alone) is None
+
+
 def test_the_oldest_is_lost_first_once_its_patience_is_over() -> None:
     chain = waiting((6, 5), (7, 6))
     chain.forget(clock(), 1100)
@@ -70,6 +76,7 @@ def test_the_oldest_is_lost_first_once_its_patience_is_over() -> None:
 
 def test_a_child_of_the_newest_is_held_back_until_that_one_is_read() -> None:
     chain = waiting((6, 5), (7, 6))
+    assert waiting((6, 5)).would_overwrite(plan(7, 6), clock(), 1001)
     soon, later = 1001 + 8_333_332, 1001 + 8_333_333
     assert chain.would_overwrite(plan(8, 7), clock(), soon)
     assert not chain.would_overwrite(plan(8, 7), clock(), later), "two ticks at 240 Hz have passed"
