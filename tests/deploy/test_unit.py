@@ -1,13 +1,14 @@
 """The systemd unit and the container agree with what the code does."""
 
 import configparser
-import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from motionserver.guard import __main__ as guard_process
+from motionserver.planner import loop as planner_process
 from motionserver.supervisor.guards import PARK_PATIENCE
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
@@ -43,13 +44,7 @@ def test_what_a_person_must_mend_is_not_started_again(service):
 
 
 def test_the_processes_may_have_the_priorities_they_ask_for(service):
-    root = UNIT.parents[1] / "motionserver"
-    asked = [
-        int(found)
-        for file in ("guard/__main__.py", "planner/loop.py")
-        for found in re.findall(r"take_priority\((\d+)", (root / file).read_text("utf-8"))
-    ]
-    assert len(asked) == 2
+    asked = guard_process.PRIORITY, planner_process.PRIORITY
     assert int(service["LimitRTPRIO"]) >= max(asked)
     assert service["RestrictRealtime"] == "no"
     assert "CPUSchedulingPolicy" not in service
