@@ -34,8 +34,8 @@ class Motion(NamedTuple):
 
 
 @cache
-def drive(rate: float, seconds: float = 100.0) -> Motion:
-    """Start, left and right turns, brakings, a stop, and once more."""
+def drive(rate: float, seconds: float = 100.0, one_sided: bool = False) -> Motion:
+    """Start, left and right turns (`one_sided`: left only), brakings, a stop, and once more."""
     fine = np.arange(0.0, seconds, 1e-3)
     forward = sum(
         size * _pulse(fine, at, length)
@@ -59,6 +59,8 @@ def drive(rate: float, seconds: float = 100.0) -> Motion:
             (0.4, 79.0, 6.0),
         )
     )
+    if one_sided:
+        turning = np.abs(turning)
     heading = 0.3 + np.cumsum(turning) * 1e-3
     left = speed * turning
     # braking dips the nose, a left turn lifts the left side; the road rises and leans slowly

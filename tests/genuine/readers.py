@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import zipfile
 from pathlib import Path
 from typing import Final
 
@@ -86,6 +87,39 @@ def comma(folder: Path) -> Strapped:
     course = np.unwrap(np.arctan2(northward, (velocity * east).sum(axis=1)))
     course = np.interp(speed_t, load("global_pose/frame_times"), course)
     return Strapped(t, load("processed_log/IMU/accelerometer/value"), rates, speed_t, speed, course)
+
+
+def taupo(file: Path) -> Strapped:
+    """RaceChrono session: a zip of arrays, little-endian, each with times of its own [ms].
+
+    Whole numbers are thousandths of m/s^2, deg/s, deg. Inertial unit of the telephone (channels
+    100 and 101), speed of the CAN bus (200), clockwise bearing of the GPS receiver (300).
+    """
+    with zipfile.ZipFile(file) as session:
+
+        def load(name: str, kind: str) -> Array:
+            return np.frombuffer(session.read(name), kind).astype(np.float64)
+
+        def times(device: str) -> Array:
+            return load(f"channel_{device}_1_1", "<u8") / 1e3
+
+        def axes(device: str, *channels: int) -> Array:
+            columns = [load(f"channel_{device}_{k}_0", "<i4") for k in channels]
+            return np.column_stack(columns) / 1e3
+
+        t, gyro_t = times("2_100_0"), times("3_101_0")
+        speed_t, bearing_t = times("12_200_4"), times("1_300_0")
+        rates = np.radians(axes("3_101_0", 12, 13, 14))
+        bearing = np.unwrap(np.radians(axes("1_300_0", 6)[:, 0]))
+        speed = load("channel2_12_200_4_4_3", "<f8")
+        return Strapped(
+            t - t[0],
+            axes("2_100_0", 9, 10, 11),
+            np.column_stack([np.interp(t, gyro_t, rate) for rate in rates.T]),
+            speed_t - t[0],
+            speed,
+            -np.interp(speed_t, bearing_t, bearing),
+        )
 
 
 def skoda(file: Path) -> Strapped:

@@ -142,6 +142,18 @@ SOURCES: Final = (
         "telephone's inertial unit at 104 Hz, CAN speed at 83 Hz",
         "MIT",
     ),
+    Source(
+        "racecar_taupo",
+        "jLynx/RaceChrono-to-CSV",
+        "42aab24de857d68e75f28771b292ce52cb4c7ddd",
+        ("Test/session_20260103_141321_race_1_lap4.rcz",),
+        "0a3bce5a1e53fcc09acc763cc85afb68be8ea48028a2d90d994c9cb6d8864321",
+        readers.taupo,
+        "Test/session_20260103_141321_race_1_lap4.rcz",
+        "racing car on a lap, model not named (an earlier session is titled BMW)",
+        "telephone's inertial unit at 50 Hz, CAN speed at 15 Hz, GPS bearing at 25 Hz",
+        "none named",
+    ),
     _skoda(
         "skoda_haifa_1", 0, 20.0, "e73a4ae66f77d35521aee07d8414666a2f2aa2339c30289b744c0c3b27d8c1b3"
     ),

@@ -60,7 +60,7 @@ def convert(raw: Strapped) -> Drive:
     # on its springs a vehicle dips its nose when it brakes and lifts its left side in a left turn
     proof.pairs[BRAKING] = correlation(_springs(pitch), _springs(-a[:, 0]))
     proof.pairs[LEANING] = correlation(_springs(roll), _springs(a[:, 1]))
-    proof.figures["gravity m/s^2"] = float(np.linalg.norm(force, axis=1)[_or_all(rest)].mean())
+    proof.figures["gravity m/s^2"] = _gravity(force, rates, speed, rest)
     proof.figures["standstill s"] = float(rest.sum()) / RATE
     proof.figures["speed delay s"] = delay
     proof.require(FORWARD, LEFT, *((COURSE,) if COURSE in proof.pairs else ()))
@@ -70,8 +70,12 @@ def convert(raw: Strapped) -> Drive:
     return Drive(dict(zip(names, values.T, strict=True)), proof)
 
 
-def _or_all(rest: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return rest if rest.any() else np.ones_like(rest)
+def _gravity(force: Array, rates: Array, speed: Array, rest: NDArray[np.bool_]) -> float:
+    """Specific force at rest; of a drive without a stop, its mean less the mean acceleration."""
+    if rest.any():
+        return float(np.linalg.norm(force[rest], axis=1).mean())
+    dv, vr = _expected(speed, rates[:, 2])
+    return float(np.linalg.norm(force.mean(axis=0) - [dv.mean(), vr.mean(), 0.0]))
 
 
 def _together(raw: Strapped) -> tuple[Array, Array, Array, Array | None, float]:
@@ -118,25 +122,30 @@ def _prove(force: Array, a: Array, rates: Array, speed: Array, course: Array | N
 def mounting(force: Array, rates: Array, speed: Array) -> Array:
     """Rotation from sensor to vehicle axes.
 
-    Up is the mean specific force: the road is level on the average. Forward is the direction
-    in the horizontal plane under which dv/dt and v x yaw rate explain most of the force.
+    Up is the mean specific force less the mean acceleration: the road is level on the average,
+    but a lap turns more to one side. Forward is the direction in the horizontal plane under which
+    dv/dt and v x yaw rate explain most of the force.
     """
-    up = force.mean(axis=0)
-    up /= np.linalg.norm(up)
-    some = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-    some /= np.linalg.norm(some)
-    level = np.vstack([some, np.cross(up, some), up])
-    slow = lowpass(force @ level.T, PROOF_BAND)
-    x, y = (slow - slow.mean(axis=0)).T[:2]
-    dv, vr = _expected(speed, rates @ up)
-    dv, vr = dv - dv.mean(), vr - vr.mean()
-    # the angle that makes (x, y) turned look most like (dv, vr)
-    angle = float(np.arctan2(dv @ y - vr @ x, dv @ x + vr @ y))
-    turn = np.array(
-        [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
-    rotation: Array = turn @ level
-    return rotation
+    slow = lowpass(force, PROOF_BAND)
+    axes, accelerated = np.eye(3), np.zeros(3)
+    for _ in range(8):
+        up = force.mean(axis=0) - accelerated
+        up /= np.linalg.norm(up)
+        some = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+        some /= np.linalg.norm(some)
+        level = np.vstack([some, np.cross(up, some), up])
+        x, y = ((slow - slow.mean(axis=0)) @ level.T).T[:2]
+        dv, vr = _expected(speed, rates @ up)
+        accelerated = np.array([dv.mean(), vr.mean(), 0.0])
+        dv, vr = dv - dv.mean(), vr - vr.mean()
+        # the angle that makes (x, y) turned look most like (dv, vr)
+        angle = float(np.arctan2(dv @ y - vr @ x, dv @ x + vr @ y))
+        turn = np.array(
+            [[np.cos(angle), np.sin(angle), 0], [-np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+        )
+        axes = turn @ level
+        accelerated = accelerated @ axes
+    return axes
 
 
 def attitude(force: Array, rates: Array, speed: Array) -> tuple[Array, Array]:

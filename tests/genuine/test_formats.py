@@ -1,6 +1,7 @@
 """Each source's format, written by hand from known motion, must come out as that motion."""
 
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -97,6 +98,29 @@ def write_comma(folder, motion, handed=1.0):
             np.save(handle, array)
 
 
+def write_taupo(file, motion):
+    start = 1.767e12
+
+    def times(t):
+        return np.round(start + 1e3 * t).astype("<u8").tobytes()
+
+    def whole(x):
+        return np.round(1e3 * x).astype("<i4").tobytes()
+
+    force, rates = motion.force @ TILTED.T, np.degrees(motion.rates @ TILTED.T)
+    bearing = np.degrees(np.pi / 2.0 - motion.heading) % 360.0
+    with zipfile.ZipFile(file, "w") as session:
+        for name, axes, first in (("2_100_0", force, 9), ("3_101_0", rates, 12)):
+            session.writestr(f"channel_{name}_1_1", times(motion.t))
+            for k in range(3):
+                session.writestr(f"channel_{name}_{first + k}_0", whole(axes[:, k]))
+        session.writestr("channel_12_200_4_1_1", times(motion.t[::3]))
+        speed = motion.speed[::3].astype("<f8").tobytes()
+        session.writestr("channel2_12_200_4_4_3", speed)
+        session.writestr("channel_1_300_0_1_1", times(motion.t[::2]))
+        session.writestr("channel_1_300_0_6_0", whole(bearing[::2]))
+
+
 def write_skoda(file, motion, mirrored=1.0):
     latitude = 32.0 + np.degrees(motion.north / 6378137.0)
     longitude = 35.0 + np.degrees(motion.east / 6378137.0 / np.cos(np.radians(32.0))) * mirrored
@@ -114,6 +138,26 @@ def test_ferrari_known_motion_comes_out(tmp_path):
     write_ferrari(tmp_path, drive(100.0))
     made = planar.convert(readers.ferrari(tmp_path))
     assert_is_motion(made, drive(100.0), 0.02)
+
+
+def test_planar_sliding_counts_as_acceleration(tmp_path):
+    motion = drive(100.0)
+    write_ferrari(tmp_path, motion)
+    sideways = 1.5 * np.sin(0.8 * motion.t) * np.sin(np.pi * motion.t / motion.t[-1]) ** 2
+    sliding = np.gradient(sideways, 0.01)
+    np.savetxt(tmp_path / "vy.txt", sideways)
+    np.savetxt(tmp_path / "axCG.txt", motion.forward - sideways * motion.rates[:, 2])
+    np.savetxt(tmp_path / "ayCG.txt", motion.left + sliding)
+    made = planar.convert(readers.ferrari(tmp_path))
+    for name in (planar.FORWARD, planar.LEFT):
+        assert made.proof.pairs[name] == pytest.approx((1.0, 1.0), abs=0.005), name
+
+
+def test_planar_offset_at_standstill_is_removed(tmp_path):
+    motion = drive(100.0)
+    write_ferrari(tmp_path, motion._replace(forward=motion.forward + 0.3, left=motion.left - 0.2))
+    made = planar.convert(readers.ferrari(tmp_path))
+    assert_is_motion(made, motion, 0.02)
 
 
 def test_seoul_known_motion_comes_out(tmp_path):
@@ -149,6 +193,22 @@ def test_comma_left_handed_accelerometers_are_refused(tmp_path):
     write_comma(tmp_path, drive(100.0), handed=-1.0)
     with pytest.raises(RefusedError, match=r"at least 0\.8"):
         strapped.convert(readers.comma(tmp_path))
+
+
+def test_taupo_known_motion_comes_out(tmp_path):
+    write_taupo(tmp_path / "lap.rcz", drive(50.0))
+    made = strapped.convert(readers.taupo(tmp_path / "lap.rcz"))
+    assert_is_motion(made, drive(100.0), 0.12)
+
+
+def test_taupo_lap_that_turns_one_way_does_not_tilt_the_road(tmp_path):
+    truth = drive(100.0, one_sided=True)
+    assert truth.left.mean() > 0.4  # a tilt of 0.05 rad
+    write_taupo(tmp_path / "lap.rcz", drive(50.0, one_sided=True))
+    made = strapped.convert(readers.taupo(tmp_path / "lap.rcz"))
+    assert_is_motion(made, truth, 0.12)
+    n = len(made.columns["roll"])
+    assert made.columns["roll"].mean() == pytest.approx(truth.roll[:n].mean(), abs=0.02)
 
 
 def test_skoda_known_motion_comes_out(tmp_path):
