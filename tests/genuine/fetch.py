@@ -82,8 +82,7 @@ def _get(address: str, source: Source, root: Path) -> bytes:
         raise FetchError(
             f"{source.name}: no answer from {address} ({error}). Check the network, or download "
             f"https://github.com/{source.repository} at commit {source.commit} elsewhere, put its "
-            f"files into {root.name}/{source.folder}/ and pass that folder as "
-            f"--from {root.name}"
+            f"files into {root / source.folder} and call this with --from {root}"
         ) from error
 
 
