@@ -48,7 +48,7 @@ SUITES = {
     f"{INTAKE}/sender_clock.py": [
         "tests/intake/test_gate.py",
         "tests/intake/test_gate_limits.py",
-        "tests/intake/test_lateness.py",
+        "tests/intake/test_late_packets.py",
         "tests/intake/test_sender_clock.py",
     ],
     f"{INTAKE}/sequence_order.py": [
@@ -57,7 +57,7 @@ SUITES = {
     ],
     f"{INTAKE}/spoilage.py": ["tests/intake/test_spoilage.py"],
     f"{INTAKE}/stamp_rate.py": ["tests/intake/test_stamp_rate.py"],
-    f"{INTAKE}/standstill.py": ["tests/intake/test_standstill.py"],
+    f"{INTAKE}/standstill.py": ["tests/intake/test_standstill_force.py"],
     INTAKE: ["tests/intake"],
     "motionserver/core/plan.py": [
         "tests/core/test_plan.py",
