@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from motions import MS, motion, preview
+from motions import motion, preview
 from scipy.spatial.transform import Rotation
 
 from motionserver.core.axes import GRAVITY
@@ -367,10 +367,10 @@ def test_ten_first_samples_a_second_are_noted_and_the_last_twenty_judged() -> No
     assert shown([9.0] * 30 + [0.0] * 10) != ""
 
 
-@given(st.floats(0.0, 1e6), st.integers(0, 10**18))
-def test_when_a_stream_begins_says_nothing(apart: float, begin: int) -> None:
+@given(st.floats(0.0, 1e6), st.integers(0, 10**12))
+def test_when_a_stream_begins_says_nothing(apart: float, begin_ms: int) -> None:
     agreement = PreviewAgreement()
     for k in range(8):
-        at = (begin + 100 * MS * k) / MS
+        at = float(begin_ms + 100 * k)
         agreement.heard(motion(at, preview=preview([0.0], x=apart)))
     assert bool(agreement.complaint) is (apart > 4.0)
